@@ -1,0 +1,1 @@
+"""Markov logic networks: parse, check, ground, infer, learn."""

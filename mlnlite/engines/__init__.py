@@ -1,0 +1,1 @@
+"""Relational plans and what runs them."""

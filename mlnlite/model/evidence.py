@@ -1,0 +1,98 @@
+"""Evidence: what is known, as integer columns, for one database or several."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.errors import Diagnostic
+from mlnlite.model.symbols import Predicate, Type
+
+Int32 = NDArray[np.int32]
+Int64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What is known of one predicate, each atom once, in order of database and arguments.
+
+    Attributes:
+        database: shape (n,), number of the database.
+        arguments: shape (n, arity), constant ids.
+        truth: shape (n,).
+    """
+
+    database: Int32
+    arguments: Int32
+    truth: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Facts of one or more databases (worlds that have nothing to do with each other but share a model).
+
+    Attributes:
+        types: by name: the constants of the model, then those that the databases add.
+        predicates: as in the model, with the closed worlds that were asked for.
+        facts: by predicate name; predicates without a fact have an empty table.
+        present: by type name, shape (n_databases, n_constants): which constants each database has: those of the model,
+            those that its file declares, and those it mentions.
+        n_databases: how many.
+        names: where each database is from.
+        warnings: what reading found strange.
+    """
+
+    types: Mapping[str, Type]
+    predicates: Mapping[str, Predicate]
+    facts: Mapping[str, Facts]
+    present: Mapping[str, NDArray[np.bool_]]
+    n_databases: int = 1
+    names: tuple[str, ...] = ()
+    warnings: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
+
+    def sizes(self, predicate: str) -> tuple[int, ...]:
+        """Number of constants of each argument of a predicate."""
+        return tuple(len(self.types[t].constants) for t in self.predicates[predicate].types)
+
+    def first_atom(self) -> dict[str, int]:
+        """Number of the first atom of each predicate: atoms are numbered predicate by predicate."""
+        first, at = {}, 0
+        for name in self.predicates:
+            first[name] = at
+            at += int(np.prod(self.sizes(name), dtype=object))
+        return first
+
+    def atom_number(self, predicate: str, arguments: Int32) -> Int64:
+        """Numbers of ground atoms: mixed radix over the arguments, the last one fastest, after `first_atom`.
+
+        Args:
+            predicate: its name.
+            arguments: shape (n, arity), constant ids.
+
+        Returns:
+            Shape (n,).
+        """
+        number = np.zeros(len(arguments), np.int64)
+        for column, size in zip(arguments.T, self.sizes(predicate), strict=True):
+            number = number * size + column
+        return number + self.first_atom()[predicate]
+
+    def atom_at(self, number: int) -> tuple[str, tuple[int, ...]]:
+        """Predicate and constant ids of atom `number`."""
+        first = self.first_atom()
+        name = max((n for n, f in first.items() if f <= number and 0 not in self.sizes(n)), key=lambda n: first[n])
+        rest, arguments = number - first[name], []
+        for size in reversed(self.sizes(name)):
+            rest, constant = divmod(rest, size)
+            arguments.append(constant)
+        return name, tuple(reversed(arguments))
+
+    def atom_text(self, number: int) -> str:
+        """Atom `number` as a user writes it: `Friends(Anna, Bob)`."""
+        name, arguments = self.atom_at(number)
+        types = self.predicates[name].types
+        constants = [self.types[t].constants[c] for t, c in zip(types, arguments, strict=True)]
+        return f"{name}({', '.join(constants)})" if constants else name

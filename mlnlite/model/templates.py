@@ -1,0 +1,48 @@
+"""A template is a formula with a table of weights: one row for each combination of constants of its key variables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.model.formulas import Formula
+from mlnlite.source import Span
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A weighted formula, or many that differ only in constants.
+
+    A formula without `+` and without siblings has no keys and one row. `+x` makes x a key. Formulas read from a file
+    that differ only in constants and weights share one template whose keys stand for what differs.
+
+    Attributes:
+        name: how messages call it, `formula 3`.
+        formula: the typed formula, keys being free variables of it.
+        keys: indices of the key variables in `formula.variables`.
+        rows: constant ids of the keys, shape (n_rows, n_keys); None if every combination of constants has a row, which
+            then stands in mixed-radix order of the keys, the last key fastest.
+        weights: log weight of each row, shape (n_rows,), `inf` for a hard formula, `nan` where none was given;
+            shape (1,), the same for all rows, where `rows` is None and nothing has been learnt.
+        fixed: not to be learnt.
+        text: the formula as its user wrote it, keys included.
+        span: where (its first row).
+        row_spans: where each row stands, if it came from a file row by row.
+    """
+
+    name: str
+    formula: Formula
+    keys: tuple[int, ...]
+    rows: NDArray[np.int32] | None
+    weights: NDArray[np.float64]
+    fixed: bool = False
+    text: str = ""
+    span: Span | None = field(default=None, compare=False, repr=False)
+    row_spans: tuple[Span, ...] = field(default=(), compare=False, repr=False)
+
+    @property
+    def hard(self) -> bool:
+        """Whether it forbids every world in which some grounding is false."""
+        return bool(np.isposinf(self.weights).all())
