@@ -1,0 +1,79 @@
+"""Connected components: in comes what links variables, out comes which of them hang together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from mlnlite.ground.network import Int32, Int64, Network
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A part of a network that shares no factor with the rest of it.
+
+    Attributes:
+        variables: its variables, rising.
+        clauses: for each block of `Network.clauses`, the rows that belong to it, rising.
+        tables: for each block of `Network.tables`, the rows that belong to it, rising.
+    """
+
+    variables: Int64
+    clauses: tuple[Int64, ...]
+    tables: tuple[Int64, ...]
+
+
+def labels_of(n_variables: int, scopes: Iterable[Int32]) -> Int32:
+    """Component number of each variable.
+
+    Args:
+        n_variables: how many variables there are.
+        scopes: arrays of shape (n, k): each row links its variables.
+
+    Returns:
+        Shape (n_variables,), numbered by the smallest variable of each component.
+    """
+    linked = [s for s in scopes if s.shape[1] > 1]
+    start = np.concatenate([np.repeat(s[:, 0], s.shape[1] - 1) for s in linked] or [np.zeros(0, np.int32)])
+    end = np.concatenate([s[:, 1:].ravel() for s in linked] or [np.zeros(0, np.int32)])
+    graph = coo_matrix((np.ones(len(start), np.int8), (start, end)), shape=(n_variables, n_variables))
+    _, labels = connected_components(graph, directed=False)
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[inverse].astype(np.int32)
+
+
+def rows_by_label(labels: Int32, n_labels: int) -> tuple[Int64, Int64]:
+    """Rows sorted by label, and where each label starts.
+
+    Args:
+        labels: shape (n,).
+        n_labels: how many labels there are.
+
+    Returns:
+        Shapes (n,) and (n_labels + 1,): rows `order[starts[i] : starts[i + 1]]` have label i, rising.
+    """
+    order = np.argsort(labels, kind="stable")
+    return order, np.searchsorted(labels[order], np.arange(n_labels + 1))
+
+
+def components_of(network: Network) -> tuple[Component, ...]:
+    """The components of a network, in order of their smallest variable.
+
+    Factors without an open atom belong to none.
+    """
+    scopes = [network.variable[np.abs(c.literals) - 1] for c in network.clauses]
+    scopes += [network.variable[t.atoms] for t in network.tables]
+    labels = labels_of(network.n_variables, scopes)
+    n = int(labels.max(initial=-1)) + 1
+    variables, starts = rows_by_label(labels, n)
+    blocks = [rows_by_label(labels[s[:, 0]] if s.shape[1] else np.full(len(s), n, np.int32), n) for s in scopes]
+    parts = []
+    for i in range(n):
+        rows = [order[begin[i] : begin[i + 1]] for order, begin in blocks]
+        split = len(network.clauses)
+        parts.append(Component(variables[starts[i] : starts[i + 1]], tuple(rows[:split]), tuple(rows[split:])))
+    return tuple(parts)

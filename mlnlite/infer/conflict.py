@@ -1,0 +1,91 @@
+"""Why no world is possible: comes in a network, goes out a `Contradiction` that names formulas that exclude each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+from pysat.solvers import Solver
+
+from mlnlite.errors import Contradiction, Diagnostic
+from mlnlite.ground.network import Network
+
+
+def contradiction(network: Network) -> Contradiction:
+    """The error for a network whose hard formulas no world satisfies.
+
+    It names every template of a set of hard formulas that exclude each other and that is as small as leaving out one
+    after the other can make it. (Formulas of which evidence alone makes a grounding false are named without search.)
+    """
+    weights = _decided_false(network)
+    decided = bool(weights)
+    templates = sorted({int(network.template[w]) for w in weights or _core(network)})
+    named = [network.model.templates[t] for t in templates]
+    if decided:
+        what = "the evidence makes it false, and it is hard"
+    elif len(named) > 1:
+        what = f"no world satisfies these {len(named)} hard formulas together with the evidence"
+    else:
+        what = "no world satisfies this hard formula together with the evidence"
+    hint = "correct the evidence, or give one of them a finite weight"
+    return Contradiction(
+        [Diagnostic("E301", f"{t.name}: {t.text}: {what}", t.span, hint if t is named[-1] else "") for t in named]
+        or [Diagnostic("E301", "no world is possible", hint="look for functional predicates without a possible value")]
+    )
+
+
+def _decided_false(network: Network) -> list[int]:
+    """Hard weights of which evidence makes a grounding false."""
+    open_count = np.zeros(len(network.weights), np.int64)
+    for block in (*network.clauses, *network.tables):
+        np.add.at(open_count, block.weight, block.count)
+    hard = np.isposinf(network.weights)
+    return np.flatnonzero(hard & (network.decided_true + open_count < network.n_groundings)).tolist()
+
+
+def _core(network: Network) -> list[int]:
+    """Hard weights that exclude each other: the solver's core, then each left out in turn if the rest still conflicts."""
+    first = network.n_atoms + 1
+    with Solver(name="cadical153") as solver:
+        for literals in _blocks(network):
+            solver.add_clause(literals)
+        for weight, literals in _hard_clauses(network):
+            solver.add_clause([-(first + weight), *literals])
+        core = np.flatnonzero(np.isposinf(network.weights)) + first
+        if solver.solve(assumptions=core.tolist()):
+            return []
+        keep = sorted(solver.get_core() or [])
+        for w in list(keep):
+            rest = [x for x in keep if x != w]
+            if w in keep and not solver.solve(assumptions=rest):
+                keep = sorted(solver.get_core() or [])
+    return [int(w) - first for w in keep]
+
+
+def _blocks(network: Network) -> Iterator[list[int]]:
+    """Clauses that give each block one value."""
+    order = np.argsort(network.variable, kind="stable")
+    starts = np.searchsorted(network.variable[order], np.arange(network.n_variables + 1))
+    for v in np.flatnonzero(network.block).tolist():
+        atoms = (order[starts[v] : starts[v + 1]] + 1).tolist()
+        if len(atoms) == network.cardinality[v]:
+            yield atoms
+        yield from ([-a, -b] for a, b in combinations(atoms, 2))
+
+
+def _hard_clauses(network: Network) -> Iterator[tuple[int, list[int]]]:
+    """Clauses of the hard groundings, each with its weight."""
+    hard = np.isposinf(network.weights)
+    for block in network.clauses:
+        rows = hard[block.weight]
+        for weight, literals in zip(block.weight[rows].tolist(), block.literals[rows].tolist(), strict=True):
+            if block.negated:
+                yield from ((weight, [-x]) for x in literals)
+            else:
+                yield weight, literals
+    for table in network.tables:
+        rows = hard[table.weight]
+        signs = 1 - 2 * np.argwhere(~table.truth)
+        for weight, atoms in zip(table.weight[rows].tolist(), table.atoms[rows], strict=True):
+            yield from ((weight, literals) for literals in ((atoms + 1) * signs).tolist())

@@ -1,0 +1,186 @@
+"""Exact marginals: comes in a network, goes out a probability for each atom and the log partition function."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from mlnlite.errors import LimitReached
+from mlnlite.ground.network import Bool, Float, Int64, Network
+from mlnlite.infer.conflict import contradiction
+from mlnlite.infer.elimination import log_sum
+from mlnlite.infer.order import TooWide, Tree, plan
+from mlnlite.infer.parts import Batch, Division, Part, batches, divide, parts
+from mlnlite.infer.potentials import potentials_of
+
+WIDTH_LIMIT = 1 << 25
+MEMORY_LIMIT = 1 << 27
+CLOSED_FORM, ELIMINATION = "closed form", "elimination"
+
+
+@dataclass(frozen=True, slots=True)
+class AtomProbabilities:
+    """Probabilities of the atoms of a network.
+
+    Attributes:
+        probability: shape (n_atoms,), nan for atoms that were not asked for or not answered.
+        exact: shape (n_atoms,), whether the probability is exact to machine precision.
+        method: how each was found, empty where it was not.
+        log_z: log of the sum of the weights of all worlds of the atoms in the network, the groundings that evidence
+            decides included. (Unknown atoms that no factor and no question touches are not in the network; each of
+            them, were it counted, would add log 2.) nan if the answer did not need every component.
+        n_components: how many components the network has.
+        largest_table: number of entries of the largest table.
+    """
+
+    probability: Float
+    exact: Bool
+    method: tuple[str, ...]
+    log_z: float
+    n_components: int
+    largest_table: int
+
+
+@dataclass(slots=True)
+class Distributions:
+    """Distributions of variables, filled in component by component.
+
+    Attributes:
+        start: shape (n_variables,), where the distribution of each variable starts in `probability`.
+        probability: shape (total cardinality,), nan where not worked out.
+        log_z: shape (n_components,), nan where not worked out.
+        method: of each component, empty where not worked out.
+        wide: components past the limit, with what it would have taken.
+        largest_table: number of entries.
+    """
+
+    start: Int64
+    probability: Float
+    log_z: Float
+    method: list[str]
+    wide: list[tuple[Part, TooWide]] = field(default_factory=list)
+    largest_table: int = 0
+
+
+def marginals_of(
+    network: Network,
+    atoms: Int64 | None = None,
+    *,
+    width_limit: int = WIDTH_LIMIT,
+    too_wide: Literal["raise", "leave"] = "raise",
+) -> AtomProbabilities:
+    """Probabilities of atoms by closed form, listing and elimination.
+
+    Args:
+        network: what was ground.
+        atoms: indices into `network.atoms`; None for all. Components without any of them are not looked at.
+        width_limit: largest number of entries of a table.
+        too_wide: what to do with components past the limit: raise, or leave their atoms to another method.
+
+    Raises:
+        Contradiction: no world satisfies the hard formulas.
+        LimitReached: a component is too wide.
+        QueryMistake: a weight is not known.
+    """
+    potentials = potentials_of(network)
+    asked = np.zeros(network.n_atoms, np.bool_)
+    asked[slice(None) if atoms is None else atoms] = True
+    wanted = np.zeros(len(potentials.cardinality), np.bool_)
+    wanted[network.variable[asked]] = True
+    division = divide(potentials)
+    found = distributions_of(division, wanted, wanted if atoms is not None else None, width_limit)
+    if np.isneginf(potentials.constant) or np.isneginf(found.log_z).any():
+        raise contradiction(network)
+    if found.wide and too_wide == "raise":
+        raise limit_reached(network, found.wide, width_limit)
+    probability = np.where(asked, found.probability[found.start[network.variable] + network.value], np.nan)
+    label = division.label[network.variable].tolist()
+    method = tuple(found.method[c] if a else "" for c, a in zip(label, asked.tolist(), strict=True))
+    log_z = float(found.log_z.sum() + potentials.constant)
+    exact = ~np.isnan(probability)
+    return AtomProbabilities(probability, exact, method, log_z, division.n_components, found.largest_table)
+
+
+def distributions_of(
+    division: Division, wanted: Bool, needed: Bool | None = None, width_limit: int = WIDTH_LIMIT
+) -> Distributions:
+    """Distributions of variables and the log partition function of each component.
+
+    Args:
+        division: the components.
+        wanted: shape (n_variables,), whose distribution to work out.
+        needed: shape (n_variables,): only components with one of these are looked at; None for all components.
+        width_limit: largest number of entries of a table.
+    """
+    cardinality = division.potentials.cardinality
+    start = np.cumsum(cardinality, dtype=np.int64) - cardinality
+    n = division.n_components
+    found = Distributions(start, np.full(int(cardinality.sum()), np.nan), np.full(n, np.nan), [""] * n)
+    take = np.ones(n, np.bool_)
+    if needed is not None:
+        take = np.bincount(division.label[needed], minlength=n) > 0
+    for batch in batches(division, take):
+        _list_worlds(batch, found)
+    for part in parts(division, take):
+        _eliminate(part, wanted, width_limit, found)
+    return found
+
+
+def _list_worlds(batch: Batch, found: Distributions) -> None:
+    """Sums over all worlds of small components."""
+    n = len(batch.components)
+    flat = batch.tables.reshape(n, -1)
+    peak = flat.max(axis=1)
+    weight = np.exp(flat - np.where(np.isneginf(peak), 0.0, peak)[:, None])
+    mass = weight.sum(axis=1)
+    with np.errstate(divide="ignore"):
+        found.log_z[batch.components] = np.where(np.isneginf(peak), peak, peak + np.log(mass))
+    weight = (weight / np.where(mass > 0, mass, 1.0)[:, None]).reshape(batch.tables.shape)
+    n_axes = batch.variables.shape[1]
+    for axis in range(n_axes):
+        distribution = weight.sum(axis=tuple(a + 1 for a in range(n_axes) if a != axis))
+        for value in range(distribution.shape[1]):
+            found.probability[found.start[batch.variables[:, axis]] + value] = distribution[:, value]
+    for component in batch.components.tolist():
+        found.method[component] = CLOSED_FORM if n_axes == 1 else ELIMINATION
+    found.largest_table = max(found.largest_table, flat.shape[1])
+
+
+def _eliminate(part: Part, wanted: Bool, width_limit: int, found: Distributions) -> None:
+    """Sums over all worlds of a large component."""
+    tree = plan(part.cardinality, [c.scope for c in part.cells], width_limit)
+    if isinstance(tree, Tree) and sum(tree.sizes) > max(MEMORY_LIMIT, width_limit):
+        tree = TooWide(max(map(len, tree.scopes)), float(np.log2(sum(tree.sizes))))
+    if isinstance(tree, TooWide):
+        found.wide.append((part, tree))
+        return
+    total, distributions = log_sum(tree, part.cardinality, part.cells, wanted[part.variables])
+    found.log_z[part.component] = total
+    found.method[part.component] = ELIMINATION
+    found.largest_table = max(found.largest_table, *tree.sizes)
+    for v, distribution in distributions.items():
+        begin = found.start[part.variables[v]]
+        found.probability[begin : begin + len(distribution)] = distribution
+
+
+def limit_reached(network: Network, wide: list[tuple[Part, TooWide]], width_limit: int) -> LimitReached:
+    """Says how wide the widest of some components is and what would help."""
+    part, needs = max(wide, key=lambda w: w[1].log2_size)
+    n_atoms = int(np.isin(network.variable, part.variables).sum())
+    example = _example(network, part)
+    return LimitReached(
+        f"{n_atoms} unknown atoms{example} hang together so closely that an exact answer needs a table over "
+        f"{needs.variables} variables (2^{needs.log2_size:.1f} entries; the limit is 2^{np.log2(width_limit):.0f})",
+        hint="give more evidence, declare predicates closed world, mark a functional argument with `!` or `?`, "
+        "ask for fewer atoms, or raise the width limit",
+    )
+
+
+def _example(network: Network, part: Part) -> str:
+    """One atom of the component, if atoms have names."""
+    if not network.evidence.predicates:
+        return ""
+    atom = int(np.flatnonzero(np.isin(network.variable, part.variables))[0])
+    return f" (such as {network.evidence.atom_text(int(network.atoms[atom]))})"

@@ -1,0 +1,37 @@
+"""Exact marginals against listing all worlds."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from mlnlite.errors import Contradiction, LimitReached
+from mlnlite.infer import marginal, parts
+from mlnlite.infer.marginal import marginals_of
+from tests.networks import network, networks, world_weight, worlds
+
+
+def enumerate_worlds(net):
+    truth = worlds(net)
+    weight = np.array([world_weight(net, t) for t in truth])
+    if np.all(np.isneginf(weight)):
+        return -np.inf, None
+    peak = weight.max()
+    p = np.exp(weight - peak)
+    return peak + np.log(p.sum()), (p / p.sum()) @ truth
+
+
+@pytest.mark.parametrize("small", [1, 1024])
+@settings(max_examples=150, deadline=None)
+@given(net=networks())
+def test_marginals_equal_enumeration(net, small):
+    log_z, expected = enumerate_worlds(net)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(marginal, "divide", lambda p: parts.divide(p, small))
+        if expected is None:
+            with pytest.raises(Contradiction):
+                marginals_of(net)
+            return
+        answer = marginals_of(net)
+    assert answer.log_z == pytest.approx(log_z, abs=1e-9)
+    np.testing.assert_allclose(answer.probability, expected, atol=1e-9)
+    assert answer.exact.all()

@@ -1,0 +1,118 @@
+"""Small networks built by hand or at random, and what they mean, by listing all their worlds."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from hypothesis import strategies as st
+
+from mlnlite.ground.network import Clauses, Network, Tables
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.formulas import Any, AtomRef, Formula
+from mlnlite.model.model import Model
+from mlnlite.model.templates import Template
+
+
+def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undecided_false=None):
+    """A network whose atoms have no meaning.
+
+    blocks: for each variable ("", 1), ("!", number of atoms) or ("?", number of atoms).
+    clauses: (list of (literals, weight index, count), negated), literals of equal length.
+    tables: (truth, list of (atoms, weight index, count)).
+    """
+    variable, value, cardinality, is_block = [], [], [], []
+    for v, (marker, n) in enumerate(blocks):
+        variable += [v] * n
+        value += range(n) if marker == "!" else range(1, n + 1)
+        cardinality.append(n if marker == "!" else n + 1)
+        is_block.append(marker != "")
+    n_weights = len(weights)
+    clause_blocks = []
+    for rows, negated in clauses:
+        literals = np.array([sorted(r[0], key=abs) for r in rows], np.int32).reshape(len(rows), -1)
+        clause_blocks.append(Clauses(literals, *_columns(rows), negated))
+    table_blocks = [
+        Tables(np.array([r[0] for r in rows], np.int32).reshape(len(rows), -1), np.array(truth, bool), *_columns(rows))
+        for truth, rows in tables
+    ]
+    decided = np.zeros(n_weights, np.int64) if decided_true is None else np.array(decided_true, np.int64)
+    total = decided + (0 if undecided_false is None else np.array(undecided_false, np.int64))
+    for b in (*clause_blocks, *table_blocks):
+        np.add.at(total, b.weight, b.count)
+    templates = tuple(
+        Template(f"formula {i + 1}", Formula((), (), Any((AtomRef(0),))), (), None, np.array([w], float), text=f"f{i + 1}")
+        for i, w in enumerate(weights)
+    )
+    return Network(
+        Model({}, {}, templates), Evidence({}, {}, {}, {}), np.arange(len(variable), dtype=np.int64),
+        np.array(variable, np.int32), np.array(value, np.int32), np.array(cardinality, np.int32),
+        np.array(is_block, bool), tuple(clause_blocks), tuple(table_blocks), np.array(weights, float),
+        np.arange(n_weights, dtype=np.int32), decided, total,
+    )  # fmt: skip
+
+
+def _columns(rows):
+    return np.array([r[1] for r in rows], np.int32), np.array([r[2] for r in rows], np.int64)
+
+
+def worlds(net):
+    """Truth values of the atoms in every world: shape (n_worlds, n_atoms)."""
+    values = np.array(list(product(*map(range, net.cardinality.tolist()))), np.int64).reshape(-1, net.n_variables)
+    return values[:, net.variable] == net.value
+
+
+def world_counts(net, truth):
+    """True groundings of each weight, one by one."""
+    counts = net.decided_true.copy()
+    for c in net.clauses:
+        for literals, w, n in zip(c.literals.tolist(), c.weight, c.count, strict=True):
+            holds = any(bool(truth[abs(x) - 1]) == (x > 0) for x in literals)
+            counts[w] += n * (holds != c.negated)
+    for t in net.tables:
+        for atoms, w, n in zip(t.atoms.tolist(), t.weight, t.count, strict=True):
+            counts[w] += n * bool(t.truth[tuple(int(truth[a]) for a in atoms)])
+    return counts
+
+
+def world_weight(net, truth):
+    """Log-weight of a world, by its definition."""
+    counts = world_counts(net, truth)
+    hard = np.isposinf(net.weights)
+    if np.any(counts[hard] < net.n_groundings[hard]):
+        return -np.inf
+    return float(counts[~hard] @ net.weights[~hard])
+
+
+@st.composite
+def networks(draw, max_atoms=10, hard=True):
+    """Random networks with blocks, clauses, conjunctions, tables, zero, negative and hard weights."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    blocks, n = [], 0
+    target = draw(st.integers(1, max_atoms))
+    while n < target:
+        marker = str(rng.choice(["", "", "", "!", "?"]))
+        size = 1 if not marker else min(int(rng.integers(1, 5)), target - n)
+        blocks.append((marker, size))
+        n += size
+    weights = [round(float(w), 2) for w in rng.normal(0, 1.5, rng.integers(2, 7))] + [0.0]
+    if hard:
+        weights += [np.inf] * int(rng.integers(0, 3))
+    clauses = []
+    for _ in range(rng.integers(0, 6)):
+        k = min(int(rng.integers(1, 5)), n)
+        rows = [_row(rng, n, k, weights, signed=True) for _ in range(rng.integers(1, 4))]
+        clauses.append((rows, bool(rng.random() < 0.3)))
+    tables = []
+    for _ in range(rng.integers(0, 3)):
+        k = min(int(rng.integers(1, 4)), n)
+        truth = rng.random((2,) * k) < 0.5
+        tables.append((truth, [_row(rng, n, k, weights, signed=False) for _ in range(rng.integers(1, 3))]))
+    decided = rng.integers(0, 3, len(weights))
+    return network(blocks, clauses, tables, weights, decided)
+
+
+def _row(rng, n, k, weights, signed):
+    atoms = rng.choice(n, k, replace=False)
+    literals = [int(a + 1) * int(rng.choice([-1, 1])) for a in atoms] if signed else [int(a) for a in atoms]
+    return literals, int(rng.integers(len(weights))), int(rng.integers(1, 4))
