@@ -1,1 +1,88 @@
-"""Markov logic networks: parse, check, ground, infer, learn."""
+"""Markov logic networks: exact where affordable, fast, and clear.
+
+>>> import mlnlite as ml
+>>> model = ml.model_from_text("Smokes(person)\\nCancer(person)\\n1.5 Smokes(x) => Cancer(x)")
+>>> evidence = ml.evidence_from_text("Smokes(Anna)", model=model)
+>>> print(f"{ml.marginal(model, evidence, query=['Cancer'])['Cancer(Anna)']:.4f}")
+0.8176
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mlnlite.errors import Contradiction as Contradiction
+from mlnlite.errors import Diagnostic as Diagnostic
+from mlnlite.errors import EvidenceMistake as EvidenceMistake
+from mlnlite.errors import LimitReached as LimitReached
+from mlnlite.errors import MissingPart as MissingPart
+from mlnlite.errors import MlnError as MlnError
+from mlnlite.errors import ModelMistake as ModelMistake
+from mlnlite.errors import QueryMistake as QueryMistake
+from mlnlite.errors import SyntaxMistake as SyntaxMistake
+from mlnlite.errors import did_you_mean as did_you_mean
+from mlnlite.plugins import Plugin as Plugin
+
+if TYPE_CHECKING:
+    from mlnlite.ground.ground import ground as ground
+    from mlnlite.ground.network import Network as Network
+    from mlnlite.infer.answer import map_state as map_state
+    from mlnlite.infer.answer import marginal as marginal
+    from mlnlite.learn.evaluate import Evaluation as Evaluation
+    from mlnlite.learn.evaluate import evaluate as evaluate
+    from mlnlite.learn.learned import LearnedModel as LearnedModel
+    from mlnlite.learn.weights import learn as learn
+    from mlnlite.model.evidence import Evidence as Evidence
+    from mlnlite.model.facts import closed as closed
+    from mlnlite.model.facts import no_evidence as no_evidence
+    from mlnlite.model.model import Model as Model
+    from mlnlite.model.read import evidence_from_text as evidence_from_text
+    from mlnlite.model.read import model_from_text as model_from_text
+    from mlnlite.model.read import one_database as one_database
+    from mlnlite.model.read import read_evidence as read_evidence
+    from mlnlite.model.read import read_model as read_model
+    from mlnlite.model.unparse import model_text as model_text
+    from mlnlite.results import MapState as MapState
+    from mlnlite.results import Marginals as Marginals
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "ground": "mlnlite.ground.ground",
+    "Network": "mlnlite.ground.network",
+    "map_state": "mlnlite.infer.answer",
+    "marginal": "mlnlite.infer.answer",
+    "Evaluation": "mlnlite.learn.evaluate",
+    "evaluate": "mlnlite.learn.evaluate",
+    "LearnedModel": "mlnlite.learn.learned",
+    "learn": "mlnlite.learn.weights",
+    "Evidence": "mlnlite.model.evidence",
+    "closed": "mlnlite.model.facts",
+    "no_evidence": "mlnlite.model.facts",
+    "Model": "mlnlite.model.model",
+    "evidence_from_text": "mlnlite.model.read",
+    "model_from_text": "mlnlite.model.read",
+    "one_database": "mlnlite.model.read",
+    "read_evidence": "mlnlite.model.read",
+    "read_model": "mlnlite.model.read",
+    "model_text": "mlnlite.model.unparse",
+    "MapState": "mlnlite.results",
+    "Marginals": "mlnlite.results",
+}
+"""Where the public names live. They are imported when first used, so that `mlnlite --help` does not load NumPy."""
+
+
+def __getattr__(name: str) -> object:
+    """A public name, imported on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mlnlite' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """All public names."""
+    return sorted({*globals(), *_HOMES})

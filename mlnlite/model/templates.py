@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.model.formulas import Formula
+from mlnlite.model.symbols import Type
 from mlnlite.source import Span
 
 
@@ -27,6 +30,8 @@ class Template:
         weights: log weight of each row, shape (n_rows,), `inf` for a hard formula, `nan` where none was given;
             shape (1,), the same for all rows, where `rows` is None and nothing has been learnt.
         fixed: not to be learnt.
+        unique: groups of keys (indices into `keys`) whose order does not matter: of the rows that differ only in the
+            order of such a group there is one, that with rising ids; equal ones are kept.
         text: the formula as its user wrote it, keys included.
         span: where (its first row).
         row_spans: where each row stands, if it came from a file row by row.
@@ -38,6 +43,7 @@ class Template:
     rows: NDArray[np.int32] | None
     weights: NDArray[np.float64]
     fixed: bool = False
+    unique: tuple[tuple[int, ...], ...] = ()
     text: str = ""
     span: Span | None = field(default=None, compare=False, repr=False)
     row_spans: tuple[Span, ...] = field(default=(), compare=False, repr=False)
@@ -46,3 +52,16 @@ class Template:
     def hard(self) -> bool:
         """Whether it forbids every world in which some grounding is false."""
         return bool(np.isposinf(self.weights).all())
+
+    def expanded(self, types: Mapping[str, Type]) -> Template:
+        """The same template with explicit rows, for the constants of `types`."""
+        if self.rows is not None:
+            return self
+        sizes = [len(types[self.formula.variables[k].type].constants) for k in self.keys]
+        rows = np.indices(sizes, np.int32).reshape(len(sizes), -1).T if sizes else np.zeros((1, 0), np.int32)
+        keep = np.ones(len(rows), bool)
+        for group in self.unique:
+            for i, j in pairwise(group):
+                keep &= rows[:, i] <= rows[:, j]
+        rows = np.ascontiguousarray(rows[keep])
+        return replace(self, rows=rows, weights=np.broadcast_to(self.weights, len(rows)).copy())

@@ -1,0 +1,300 @@
+"""A template to a relational plan: which groundings evidence leaves open, as rows of atom numbers.
+
+Evidence comes first: a literal that must be true of a closed predicate generates its rows, any other one filters. Only
+variables that no literal generates range over the constants of their type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlnlite.engines.plan import AntiJoin, Compute, Count, Join, Lookup, One, Plan, Project, Scan, Union, Where
+from mlnlite.ground.tables import KNOWN_FALSE
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.formulas import Argument, AtomRef, AtomSchema, Const, Equal, Formula, Var
+from mlnlite.model.propositional import Cube
+
+
+WORLDS = "worlds"
+"""Table of the numbers of the databases."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What plans of one formula draw on.
+
+    Attributes:
+        formula: without quantifiers.
+        evidence: completed.
+        keys: the key variables.
+        rows: name of the table of the template's rows (keys, then row number).
+        n_rows: its length.
+        world: the column of the database, or None where there is one database only.
+    """
+
+    formula: Formula
+    evidence: Evidence
+    keys: tuple[int, ...]
+    rows: str
+    n_rows: int
+    world: str | None = None
+
+    def columns(self, schema: AtomSchema) -> tuple[str | int | None, ...]:
+        """How a scan of a table of the atom's predicate binds its columns."""
+        return (self.world, *map(side, schema.arguments))
+
+    def n_known(self, schema: AtomSchema, truth: bool) -> int:
+        """Number of facts about the predicate of an atom."""
+        return int(np.count_nonzero(self.evidence.facts[schema.predicate].truth == truth))
+
+    def is_closed(self, schema: AtomSchema) -> bool:
+        """Whether every atom of the predicate is known."""
+        return self.evidence.predicates[schema.predicate].closed
+
+
+def column(variable: int) -> str:
+    """Name of the column of a variable."""
+    return f"v{variable}"
+
+
+def side(argument: Argument) -> str | int:
+    """A term in a plan: the column of a variable, or the id of a constant."""
+    return column(argument.index) if isinstance(argument, Var) else argument.id
+
+
+def variables_of(terms: Sequence[Argument]) -> set[int]:
+    """The variables among terms."""
+    return {t.index for t in terms if isinstance(t, Var)}
+
+
+# --- bindings of a cube: generate, then filter as early as possible
+
+
+@dataclass(frozen=True, slots=True)
+class _Filter:
+    needs: frozenset[int]
+    apply: Callable[[Plan], Plan]
+
+
+def bindings(source: Source, cube: Cube, needed: Sequence[int]) -> Plan:
+    """Bindings of the `needed` variables (and the row, and the world) for which evidence contradicts no literal.
+
+    Args:
+        source: the formula and what is known.
+        cube: literals that must be possible.
+        needed: variables that must be bound even if no literal mentions them.
+    """
+    generators, filters = _parts(source, cube)
+    equal = [p for p, truth in cube.items() if isinstance(p, Equal) and truth]
+    wanted = set(needed).union(*(f.needs for f in filters), *(g[1] for g in generators))
+    wanted |= set().union(*(variables_of((e.left, e.right)) for e in equal))
+    plan: Plan = One() if source.world is None else Scan(WORLDS, (source.world,))
+    bound: set[int] = set()
+    waiting = list(generators)
+    while waiting or not wanted <= bound:
+        plan, bound = _spread(plan, bound, equal)
+        plan, filters = _filtered(plan, bound, filters)
+        if waiting:
+            best = min(waiting, key=lambda g: (bool(bound) and not g[1] & bound, g[2]))
+            waiting.remove(best)
+            plan, bound = _joined(plan, best[0]), bound | best[1]
+        elif not wanted <= bound:
+            variable = min(wanted - bound, key=lambda v: _n_constants(source, v))
+            plan, bound = _joined(plan, _domain(source, variable)), bound | {variable}
+    plan, bound = _spread(plan, bound, equal)
+    plan, filters = _filtered(plan, bound, filters)
+    for equality in equal:
+        plan = Where(plan, *_ordered(equality, "="))
+    return plan
+
+
+def _parts(source: Source, cube: Cube) -> tuple[list[tuple[Plan, set[int], int]], list[_Filter]]:
+    """Generators (plan, variables, size) and filters of a cube."""
+    generators: list[tuple[Plan, set[int], int]] = []
+    filters: list[_Filter] = []
+    if source.keys:
+        rows = Scan(source.rows, (*map(column, source.keys), "row"))
+        generators.append((rows, set(source.keys), source.n_rows))
+    for proposition, truth in cube.items():
+        if isinstance(proposition, Equal):
+            if not truth:
+                filters.append(_different(proposition))
+            continue
+        schema = source.formula.atoms[proposition.index]
+        n_true = source.n_known(schema, True)
+        if truth and source.is_closed(schema):
+            scan = Scan(f"{schema.predicate}.true", source.columns(schema))
+            generators.append((scan, variables_of(schema.arguments), n_true))
+        elif source.n_known(schema, not truth):
+            filters.append(_excluded(source, schema, not truth))
+    return generators, filters
+
+
+def _excluded(source: Source, schema: AtomSchema, truth: bool) -> _Filter:
+    scan = Scan(f"{schema.predicate}.{'true' if truth else 'false'}", source.columns(schema))
+    return _Filter(frozenset(variables_of(schema.arguments)), lambda plan: AntiJoin(plan, scan))
+
+
+def _different(equality: Equal) -> _Filter:
+    needs = frozenset(variables_of((equality.left, equality.right)))
+    return _Filter(needs, lambda plan: Where(plan, *_ordered(equality, "!=")))
+
+
+def _ordered(equality: Equal, operator: str) -> tuple[str | int, str, str | int]:
+    return side(equality.left), operator, side(equality.right)
+
+
+def _filtered(plan: Plan, bound: set[int], filters: list[_Filter]) -> tuple[Plan, list[_Filter]]:
+    later = []
+    for item in filters:
+        if item.needs <= bound:
+            plan = item.apply(plan)
+        else:
+            later.append(item)
+    return plan, later
+
+
+def _spread(plan: Plan, bound: set[int], equal: list[Equal]) -> tuple[Plan, set[int]]:
+    """Binds variables that a cube makes equal to a bound variable or a constant."""
+    changed = True
+    while changed:
+        changed = False
+        for equality in equal:
+            for to, value in ((equality.left, equality.right), (equality.right, equality.left)):
+                if isinstance(to, Var) and to.index not in bound and variables_of([value]) <= bound:
+                    if isinstance(value, Const):
+                        plan = Compute(plan, column(to.index), (), value.id)
+                    else:
+                        plan = Compute(plan, column(to.index), ((column(value.index), 1),))
+                    bound = bound | {to.index}
+                    changed = True
+    return plan, bound
+
+
+def _joined(plan: Plan, other: Plan) -> Plan:
+    return other if isinstance(plan, One) else Join(plan, other)
+
+
+def _n_constants(source: Source, variable: int) -> int:
+    return len(source.evidence.types[source.formula.variables[variable].type].constants)
+
+
+def _domain(source: Source, variable: int) -> Plan:
+    return Scan(f"type:{source.formula.variables[variable].type}", (source.world, column(variable)))
+
+
+# --- the open groundings of a template
+
+
+def atom_column(index: int) -> str:
+    """Name of the column of atom `index`: its number, or `KNOWN_TRUE`, or `KNOWN_FALSE`."""
+    return f"a{index}"
+
+
+def equality_column(index: int) -> str:
+    """Name of the column that is 0 where equality `index` holds."""
+    return f"e{index}"
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """The plan of a template's open groundings.
+
+    Attributes:
+        plan: columns `row` (if there are keys), those of `atoms` and of `equalities`, and `count` if `counted`.
+        atoms: atoms that have a column.
+        known: truth of the atoms that have none, the same in all rows.
+        equalities: equalities that have a column; the others are in `known`.
+        counted: rows stand for several groundings.
+    """
+
+    plan: Plan
+    atoms: tuple[int, ...]
+    known: Cube
+    equalities: tuple[Equal, ...]
+    counted: bool
+
+
+def compiled(source: Source, cubes: Sequence[Cube], equalities: Sequence[Equal]) -> Compiled:
+    """The plan that lists the groundings in which some cube is possible.
+
+    Args:
+        source: the formula and what is known.
+        cubes: disjoint cubes of the formula or of its negation.
+        equalities: all equalities of the formula.
+    """
+    free = source.formula.free
+    plan: Plan
+    known: dict[AtomRef | Equal, bool] = {}
+    if len(cubes) == 1:
+        plan = bindings(source, cubes[0], free)
+        known = {p: t for p, t in cubes[0].items() if isinstance(p, Equal) or _decided(source, p)}
+    else:
+        columns = (*map(column, free), *(("row",) if source.keys else ()))
+        plan = Union(tuple(Project(bindings(source, cube, free), columns) for cube in cubes))
+    atoms = tuple(i for i in range(len(source.formula.atoms)) if AtomRef(i) not in known)
+    for i in atoms:
+        plan = _with_atom(plan, source, i)
+    open_equalities = tuple(e for e in equalities if e not in known)
+    for i, equality in enumerate(open_equalities):
+        plan = _with_equality(plan, i, equality)
+    kept = [*(["row"] if source.keys else []), *map(atom_column, atoms)]
+    kept += [equality_column(i) for i in range(len(open_equalities))]
+    seen = set(source.keys).union(*(variables_of(source.formula.atoms[i].arguments) for i in atoms))
+    counted = not set(free) <= seen or not _always_open(source, atoms)
+    final = Count(plan, tuple(kept)) if counted else Project(plan, tuple(kept))
+    return Compiled(final, atoms, known, open_equalities, counted)
+
+
+def _decided(source: Source, atom: AtomRef) -> bool:
+    return source.is_closed(source.formula.atoms[atom.index])
+
+
+def _always_open(source: Source, atoms: Sequence[int]) -> bool:
+    predicates = {source.formula.atoms[i].predicate for i in atoms}
+    return not any(len(source.evidence.facts[p].truth) or source.evidence.predicates[p].closed for p in predicates)
+
+
+def strides(evidence: Evidence, predicate: str) -> list[int]:
+    """Factor of each argument in an atom's number."""
+    sizes = evidence.sizes(predicate)
+    return [int(np.prod(sizes[i + 1 :], dtype=object)) for i in range(len(sizes))]
+
+
+def with_number(plan: Plan, evidence: Evidence, schema: AtomSchema, name: str) -> Plan:
+    """Adds the number of an atom as column `name`."""
+    terms: dict[str, int] = {}
+    constant = evidence.first_atom()[schema.predicate]
+    for argument, stride in zip(schema.arguments, strides(evidence, schema.predicate), strict=True):
+        if isinstance(argument, Const):
+            constant += argument.id * stride
+        else:
+            terms[column(argument.index)] = terms.get(column(argument.index), 0) + stride
+    return Compute(plan, name, tuple(terms.items()), constant)
+
+
+def _with_atom(plan: Plan, source: Source, index: int) -> Plan:
+    schema = source.formula.atoms[index]
+    has_facts = bool(len(source.evidence.facts[schema.predicate].truth))
+    closed = source.is_closed(schema)
+    key = (0 if source.world is None else source.world, *map(side, schema.arguments))
+    if closed:
+        return Lookup(plan, f"{schema.predicate}.known", key, atom_column(index), KNOWN_FALSE)
+    if not has_facts:
+        return with_number(plan, source.evidence, schema, atom_column(index))
+    plan = with_number(plan, source.evidence, schema, f"n{index}")
+    return Lookup(plan, f"{schema.predicate}.known", key, atom_column(index), f"n{index}")
+
+
+def _with_equality(plan: Plan, index: int, equality: Equal) -> Plan:
+    terms: dict[str, int] = {}
+    constant = 0
+    for argument, sign in ((equality.left, 1), (equality.right, -1)):
+        if isinstance(argument, Const):
+            constant += sign * argument.id
+        else:
+            terms[column(argument.index)] = terms.get(column(argument.index), 0) + sign
+    return Compute(plan, equality_column(index), tuple(terms.items()), constant)

@@ -1,0 +1,111 @@
+"""Rows of a template's plan, gathered by what evidence knows: rows that know the same have the same residual formula."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.engines.plan import Relation
+from mlnlite.ground.compile import Compiled, atom_column, equality_column
+from mlnlite.ground.residual import Shape, shape_of
+from mlnlite.ground.tables import KNOWN_TRUE
+from mlnlite.model.formulas import All, Any, AtomRef, Expression, Formula, Iff, Not
+from mlnlite.model.propositional import Proposition, simplified
+
+Int64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Rows (their indices) that leave the same shape."""
+
+    index: Int64
+    shape: Shape
+
+
+def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
+    """All rows, gathered by their residual shape.
+
+    Args:
+        formula: without quantifiers.
+        plan: what the rows are of.
+        rows: the result of running it.
+    """
+    n_rows = len(next(iter(rows.values()))) if rows else 1
+    features = _features(formula, plan, rows)
+    code, base = np.zeros(n_rows, np.int64), 1
+    for column in features.values():
+        if len(column) and (column != column[0]).any():
+            if base > 2**61 // 3:
+                code = np.unique(code, return_inverse=True)[1].reshape(-1).astype(np.int64)
+                base = int(code.max()) + 1
+            code, base = code * 3 + column, base * 3
+    groups = []
+    for index in _equal_rows(code):
+        known, merged = _meaning({key: int(column[index[0]]) for key, column in features.items()})
+        body = simplified(_renamed(formula.body, merged), {**plan.known, **known})
+        groups.append(Group(index, shape_of(body)))
+    return groups
+
+
+def _equal_rows(code: Int64) -> list[Int64]:
+    if len(code) == 0:
+        return []
+    if (code == code[0]).all():
+        return [np.arange(len(code))]
+    order = np.argsort(code, kind="stable")
+    return list(np.split(order, np.flatnonzero(np.diff(code[order])) + 1))
+
+
+def _features(
+    formula: Formula, plan: Compiled, rows: Relation
+) -> dict[Proposition | tuple[int, int], Int64]:
+    """Small numbers for each row: 0 unknown, 1 true, 2 false for a proposition; 1 for a pair of atoms that coincide."""
+    features: dict[Proposition | tuple[int, int], Int64] = {}
+    atoms = {i: rows[atom_column(i)] for i in plan.atoms}
+    for i, column in atoms.items():
+        features[AtomRef(i)] = np.where(column >= 0, 0, -column).astype(np.int64)
+    for i, equality in enumerate(plan.equalities):
+        features[equality] = np.where(rows[equality_column(i)] == 0, 1, 2).astype(np.int64)
+    for i, j in combinations(plan.atoms, 2):
+        if formula.atoms[i].predicate == formula.atoms[j].predicate:
+            features[i, j] = ((atoms[i] == atoms[j]) & (atoms[i] >= 0)).astype(np.int64)
+    return features
+
+
+def _meaning(
+    features: Mapping[Proposition | tuple[int, int], int],
+) -> tuple[dict[Proposition, bool], dict[int, int]]:
+    """What is known, and for atoms that coincide with an earlier one, which."""
+    known: dict[Proposition, bool] = {}
+    merged: dict[int, int] = {}
+    for key, value in features.items():
+        if isinstance(key, tuple):
+            if value:
+                merged.setdefault(key[1], merged.get(key[0], key[0]))
+        elif value:
+            known[key] = value == -KNOWN_TRUE
+    return known, merged
+
+
+def _renamed(expression: Expression, merged: Mapping[int, int]) -> Expression:
+    """The expression with coinciding atoms made one."""
+    if not merged:
+        return expression
+    match expression:
+        case AtomRef(index):
+            return AtomRef(merged.get(index, index))
+        case Not(operand):
+            return Not(_renamed(operand, merged))
+        case All(operands):
+            return All(tuple(_renamed(f, merged) for f in operands))
+        case Any(operands):
+            return Any(tuple(_renamed(f, merged) for f in operands))
+        case Iff(left, right):
+            return Iff(_renamed(left, merged), _renamed(right, merged))
+        case _:
+            return expression

@@ -1,0 +1,140 @@
+"""Counting joins: for each atom, how many groundings of each template row become true or false when it does.
+
+No grounding is listed. For each conjunction of a formula, and each of its literals, a join of the *other* literals with
+the data gives the bindings in which that literal decides, and a count gathers them by atom and row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.engines.plan import Count, Engine, Plan, Tables
+from mlnlite.ground.compile import Source, bindings, with_number
+from mlnlite.ground.ground import source_of
+from mlnlite.learn.separate import Case, cases
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.formulas import AtomRef, AtomSchema, Equal, Formula
+from mlnlite.model.propositional import Proposition, cubes
+from mlnlite.model.symbols import Predicate
+from mlnlite.model.templates import Template
+
+Int64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Entries:
+    """`change` groundings of weight `weight` become true when atom `atom` of `database` does (fewer if negative).
+
+    For an atom of a functional predicate, the change is against its block having no value. Entries that agree in
+    database, atom and weight add up. All arrays have shape (n,).
+    """
+
+    database: Int64
+    atom: Int64
+    weight: Int64
+    change: Int64
+
+
+def entries(
+    templates: Sequence[Template], evidence: Evidence, tables: Tables, engine: Engine, targets: frozenset[str]
+) -> dict[str, Entries]:
+    """The entries of all templates for the atoms of each target predicate.
+
+    Args:
+        templates: expanded.
+        evidence: complete: every atom that is not a fact is false.
+        tables: of the evidence and the templates' rows.
+        engine: runs the joins.
+        targets: predicates whose atoms are counted for.
+    """
+    found: dict[str, list[Entries]] = {name: [] for name in targets}
+    first = 0
+    for i, template in enumerate(templates):
+        source = source_of(i, template, evidence, "database")
+        for sign, case in _cases(source):
+            for target, (schema, _) in enumerate(case.literals):
+                if schema.predicate in targets:
+                    found[schema.predicate] += _counted(source, case, target, sign, first, (tables, engine))
+        first += len(template.weights)
+    return {name: _joined(parts) for name, parts in found.items()}
+
+
+def _cases(source: Source) -> Iterator[tuple[int, Case]]:
+    """The conjunctions whose sum, with these signs, is the formula's number of true groundings, but for a constant."""
+    false, true = cubes(source.formula.body, False), cubes(source.formula.body, True)
+    sign, chosen = (1, true) if len(true) < len(false) else (-1, false)
+    for cube in chosen:
+        for case in cases(source.formula, cube, source.evidence.predicates):
+            yield sign, case
+
+
+def _counted(
+    source: Source, case: Case, target: int, sign: int, first: int, run: tuple[Tables, Engine]
+) -> list[Entries]:
+    schema, truth = case.literals[target]
+    predicate = source.evidence.predicates[schema.predicate]
+    others = _others(case, target, predicate)
+    if others is None:
+        return []
+    plan = _plan(source, case, others, schema)
+    tables, engine = run
+    rows = engine.run(plan, tables)
+    weight = rows["row"] + first if source.keys else np.full(len(rows["count"]), first, np.int64)
+    change = rows["count"] * (sign if truth else -sign)
+    return [Entries(rows["database"], rows["atom"], weight, change)]
+
+
+def _others(case: Case, target: int, predicate: Predicate) -> list[tuple[AtomSchema, bool]] | None:
+    """The literals that must hold for the target to decide; None if they cannot.
+
+    While the target's block has no value, its other atoms are false: negative literals hold, positive ones do not.
+    """
+    schema, _ = case.literals[target]
+    others = []
+    for i, (other, sign) in enumerate(case.literals):
+        if i == target:
+            continue
+        in_block = (
+            predicate.value is not None
+            and other.predicate == predicate.name
+            and all(other.arguments[k] == schema.arguments[k] for k in predicate.keys)
+        )
+        if in_block and sign:
+            return None
+        if not in_block:
+            others.append((other, sign))
+    return others
+
+
+def _plan(source: Source, case: Case, others: list[tuple[AtomSchema, bool]], target: AtomSchema) -> Plan:
+    schemas = tuple(schema for schema, _ in others)
+    formula: Formula = replace(source.formula, atoms=schemas)
+    cube: dict[Proposition, bool] = {AtomRef(i): sign for i, (_, sign) in enumerate(others)}
+    cube |= dict.fromkeys(case.different, False)
+    cube |= {Equal(variable, by): True for variable, by in case.same}
+    plan = bindings(replace(source, formula=formula), cube, source.formula.free)
+    plan = with_number(plan, source.evidence, target, "atom")
+    by = ("database", *(("row",) if source.keys else ()), "atom")
+    return Count(plan, by)
+
+
+def _joined(parts: list[Entries]) -> Entries:
+    """All entries of a predicate, those of one atom and weight added up."""
+    if not parts:
+        empty = np.empty(0, np.int64)
+        return Entries(empty, empty, empty, empty)
+    database, atom, weight, change = (
+        np.concatenate([getattr(p, name) for p in parts]) for name in ("database", "atom", "weight", "change")
+    )
+    order = np.lexsort((weight, atom, database))
+    database, atom, weight, change = (a[order] for a in (database, atom, weight, change))
+    new = np.ones(len(order), bool)
+    new[1:] = (database[1:] != database[:-1]) | (atom[1:] != atom[:-1]) | (weight[1:] != weight[:-1])
+    starts = np.flatnonzero(new)
+    total = np.add.reduceat(change, starts) if len(starts) else change
+    keep = total != 0
+    return Entries(database[starts][keep], atom[starts][keep], weight[starts][keep], total[keep])

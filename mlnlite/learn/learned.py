@@ -1,0 +1,122 @@
+"""What `learn` gives back: the model with its weights, and how good and how trustworthy they are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.model.model import Model
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedModel:
+    """A model with learnt weights.
+
+    Attributes:
+        model: the model; its templates have one row for each weight.
+        objective: what was maximised.
+        value: the objective at the weights, without the prior.
+        prior_sd: standard deviation of the Gaussian prior with mean 0; None without prior.
+        bound: no weight is larger than this in size.
+        unbounded: shape (n_weights,), without a prior the best weight is plus (1) or minus (-1) infinity; else 0.
+        unsupported: shape (n_weights,), no atom's probability depends on the weight; it stays 0.
+        n_choices: number of atoms and blocks that were predicted from the rest.
+        status: why the search stopped: `converged` or what stopped it.
+        gradient: largest entry of the gradient of the objective and prior at the weights.
+        iterations: steps of the search.
+        seconds: time spent by stage.
+    """
+
+    model: Model
+    objective: str
+    value: float
+    prior_sd: float | None
+    bound: float
+    unbounded: NDArray[np.int8] = field(repr=False)
+    unsupported: NDArray[np.bool_] = field(repr=False)
+    n_choices: int
+    status: str
+    gradient: float
+    iterations: int
+    seconds: Mapping[str, float]
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """All weights, template by template, shape (n_weights,)."""
+        return np.concatenate([np.empty(0), *(t.weights for t in self.model.templates)])
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain data."""
+        return {
+            "objective": self.objective,
+            "value": self.value,
+            "prior": None if self.prior_sd is None else {"family": "gaussian", "mean": 0.0, "sd": self.prior_sd},
+            "bound": self.bound,
+            "n_weights": len(self.unbounded),
+            "n_finite": self.n_finite,
+            "n_zero": int(self.unsupported.sum()),
+            "n_unbounded": int(np.count_nonzero(self.unbounded)),
+            "n_choices": self.n_choices,
+            "status": self.status,
+            "gradient": self.gradient,
+            "iterations": self.iterations,
+            "seconds": dict(self.seconds),
+            "templates": [
+                {"formula": t.text, "n_weights": len(t.weights), **_short(t.weights)} for t in self.model.templates
+            ],
+        }
+
+    def to_json(self) -> str:
+        """The same as JSON text."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
+
+    @property
+    def n_finite(self) -> int:
+        """Number of weights that the data support and that have a finite best value."""
+        return int(np.count_nonzero(~self.unsupported & (self.unbounded == 0)))
+
+    def __str__(self) -> str:
+        """A summary for a terminal."""
+        prior = "none" if self.prior_sd is None else f"Gaussian, mean 0, standard deviation {self.prior_sd:g}"
+        n_unbounded = int(np.count_nonzero(self.unbounded))
+        lines = [
+            f"{self.objective:<26}{self.value:.6f}  ({self.n_choices:,} atoms and blocks predicted from the rest)",
+            f"{'prior':<26}{prior}",
+            f"{'weights':<26}{len(self.unbounded):,}",
+            f"{'  finite':<26}{self.n_finite:,}",
+            f"{'  zero':<26}{int(self.unsupported.sum()):,}  (not supported by any data)",
+            f"{'  unbounded without prior':<26}{n_unbounded:,}" + self._clipped(n_unbounded),
+            f"{'stopped':<26}{self.status} after {self.iterations} steps, largest gradient entry {self.gradient:.1e}",
+        ]
+        return "\n".join(lines)
+
+    def _clipped(self, n_unbounded: int) -> str:
+        if not n_unbounded or self.prior_sd is not None:
+            return ""
+        return f"  (clipped at +-{self.bound:g}: the data never contradict these formulas, or never support them)"
+
+    def _repr_html_(self) -> str:
+        """The same for a notebook, with the weights of small templates."""
+        rows = "".join(
+            f"<tr><td style='text-align:right'>{t.weights[0]:.6f}</td><td><code>{_escaped(t.text)}</code></td></tr>"
+            for t in self.model.templates
+            if len(t.weights) == 1
+        )
+        return f"<pre>{_escaped(str(self))}</pre><table><tr><th>weight</th><th>formula</th></tr>{rows}</table>"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def _short(weights: NDArray[np.float64]) -> dict[str, object]:
+    """The weights of a template with few rows; of one with many, their range."""
+    if np.isinf(weights).any():
+        return {"hard": True}
+    if len(weights) <= 20:
+        return {"weights": [float(w) for w in weights]}
+    return {"smallest": float(weights.min()), "largest": float(weights.max())}

@@ -1,0 +1,66 @@
+"""The pseudo-log-likelihood of choices: value, gradient, and product with the Hessian."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.learn.choices import Choices
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """The likelihood at some weights.
+
+    Attributes:
+        value: log-likelihood.
+        gradient: shape (n_weights,).
+        chance: shape (n_rows,), probability of the alternatives of each row, given the rest.
+    """
+
+    value: float
+    gradient: Float
+    chance: Float
+
+
+def at(choices: Choices, weights: Float) -> Point:
+    """The pseudo-log-likelihood and its gradient at `weights`."""
+    score = choices.log_times - choices.rows @ weights
+    n = len(choices.many)
+    top = np.maximum(_maximum(score, choices.choice, n), 0.0)
+    odds = np.exp(score - top[choices.choice])
+    total = np.exp(-top) + np.bincount(choices.choice, odds, n)
+    chance = odds / total[choices.choice]
+    value = choices.constant - float(choices.many @ (top + np.log(total)))
+    gradient = choices.rows.T @ (choices.many[choices.choice] * chance)
+    return Point(value, np.asarray(gradient), chance)
+
+
+def curvature(choices: Choices, point: Point, direction: Float) -> Float:
+    """Minus the Hessian of the log-likelihood, times `direction`."""
+    along = choices.rows @ direction
+    mean = np.bincount(choices.choice, point.chance * along, len(choices.many))
+    spread = choices.many[choices.choice] * point.chance * (along - mean[choices.choice])
+    return np.asarray(choices.rows.T @ spread)
+
+
+def curvature_diagonal(choices: Choices, point: Point) -> Float:
+    """An upper bound on the diagonal of minus the Hessian (exact for binary choices)."""
+    squared = choices.rows.copy()
+    squared.data = squared.data**2
+    return np.asarray(squared.T @ (choices.many[choices.choice] * point.chance * _rest(choices, point)))
+
+
+def _rest(choices: Choices, point: Point) -> Float:
+    alone = np.bincount(choices.choice, minlength=len(choices.many))[choices.choice] == 1
+    return np.where(alone, 1.0 - point.chance, 1.0)
+
+
+def _maximum(values: Float, group: NDArray[np.int64], n: int) -> Float:
+    result = np.full(n, -np.inf)
+    np.maximum.at(result, group, values)
+    return result

@@ -1,0 +1,227 @@
+"""Reads the facts of evidence files into integer columns and checks them against a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean
+from mlnlite.model.evidence import Evidence, Facts
+from mlnlite.model.model import Model
+from mlnlite.model.symbols import Predicate, Type
+from mlnlite.source import Source, Span
+from mlnlite.syntax.tree import EvidenceProgram, FactTable
+
+MOST_MISTAKES = 50
+"""Mistakes reported for one predicate of one file; more are counted."""
+
+
+@dataclass(slots=True)
+class _Columns:
+    """Facts of one predicate, before they are sorted; `file` and `offset` say where each stands."""
+
+    database: list[NDArray[np.int32]] = field(default_factory=list)
+    arguments: list[NDArray[np.int32]] = field(default_factory=list)
+    truth: list[NDArray[np.bool_]] = field(default_factory=list)
+    file: list[NDArray[np.int32]] = field(default_factory=list)
+    offset: list[NDArray[np.int64]] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Reading:
+    predicates: Mapping[str, Predicate]
+    types: dict[str, dict[str, int]]
+    sources: list[Source]
+    declared: list[tuple[int, int, str, list[int]]] = field(default_factory=list)
+    columns: dict[str, _Columns] = field(default_factory=dict)
+    mistakes: list[Diagnostic] = field(default_factory=list)
+
+    def ids(self, type_name: str, column: Iterable[str]) -> NDArray[np.int32]:
+        """Ids of constants, new ones for those not seen before."""
+        index = self.types[type_name]
+        try:
+            return np.fromiter(map(index.__getitem__, column), np.int32)
+        except KeyError:
+            for name in column:
+                index.setdefault(name, len(index))
+            return np.fromiter(map(index.__getitem__, column), np.int32)
+
+
+def check_evidence(
+    programs: Sequence[EvidenceProgram], sources: Sequence[Source], model: Model, *, together: bool = False
+) -> Evidence:
+    """The evidence that files mean.
+
+    Args:
+        programs: one for each file.
+        sources: their texts, for messages.
+        model: what the facts are about.
+        together: the files describe one world and have one database each; otherwise each database is a world.
+
+    Raises:
+        EvidenceMistake: with every mistake in all files.
+    """
+    types = {name: dict(t.index) for name, t in model.types.items()}
+    reading = _Reading(model.predicates, types, list(sources))
+    first = 0
+    for file, program in enumerate(programs):
+        if together and program.n_databases > 1:
+            hint = "name the one you mean, or learn from them"
+            message = f"{sources[file].name} has {program.n_databases} databases; together with others, each has one"
+            reading.mistakes.append(Diagnostic("E310", message, hint=hint))
+        _read_file(program, file, first, reading)
+        first += 0 if together else program.n_databases
+    n_databases = 1 if together else first
+    facts = {name: _sorted(name, reading) for name in model.predicates}
+    if reading.mistakes:
+        raise EvidenceMistake(reading.mistakes)
+    result_types = {name: Type(name, tuple(index)) for name, index in reading.types.items()}
+    present = _present(model, result_types, facts, n_databases, reading)
+    names = tuple(f"{s.name}#{i + 1}" for s, p in zip(sources, programs, strict=True) for i in range(p.n_databases))
+    return Evidence(
+        result_types, dict(model.predicates), facts, present, n_databases, names if not together else ("evidence",)
+    )
+
+
+def no_evidence(model: Model) -> Evidence:
+    """Evidence in which nothing is known."""
+    return check_evidence([EvidenceProgram((), (), 1)], [Source("<no evidence>", "")], model)
+
+
+def closed(evidence: Evidence, predicates: Iterable[str]) -> Evidence:
+    """The same evidence with closed worlds: an atom of these predicates that is not a fact is false."""
+    names = set(predicates)
+    for name in sorted(names - set(evidence.predicates)):
+        hint = did_you_mean(name, list(evidence.predicates))
+        raise EvidenceMistake([Diagnostic("E311", f"there is no predicate {name} to close the world of", hint=hint)])
+    changed = {n: replace(p, closed=True) if n in names else p for n, p in evidence.predicates.items()}
+    return replace(evidence, predicates=changed)
+
+
+# --- one file
+
+
+def _read_file(program: EvidenceProgram, file: int, first: int, reading: _Reading) -> None:
+    for declaration in program.types:
+        if declaration.name not in reading.types:
+            hint = did_you_mean(declaration.name, list(reading.types))
+            message = f"no predicate uses the type {declaration.name}"
+            reading.mistakes.append(Diagnostic("E301", message, declaration.span, hint))
+            continue
+        ids = reading.ids(declaration.name, [c.name for c in declaration.constants])
+        reading.declared.append((first, first + program.n_databases, declaration.name, ids.tolist()))
+    for table in program.facts:
+        _read_table(table, file, first, reading)
+
+
+def _read_table(table: FactTable, file: int, first: int, reading: _Reading) -> None:
+    predicate = reading.predicates.get(table.predicate)
+    if predicate is None:
+        hint = did_you_mean(table.predicate, list(reading.predicates)) or "the model does not declare it"
+        _each(table, file, "E302", f"the predicate {table.predicate} is not declared", hint, reading)
+        return
+    if len(table.columns) != predicate.arity:
+        message = f"{predicate.name} takes {predicate.arity}, found {len(table.columns)}"
+        _each(table, file, "E303", message, f"it is declared as {predicate}", reading)
+        return
+    arguments = np.empty((len(table.truth), predicate.arity), np.int32)
+    for i, (type_name, column) in enumerate(zip(predicate.types, table.columns, strict=True)):
+        arguments[:, i] = reading.ids(type_name, column)
+    columns = reading.columns.setdefault(predicate.name, _Columns())
+    columns.database.append(np.asarray(table.database, np.int32) + np.int32(first))
+    columns.arguments.append(arguments)
+    columns.truth.append(np.asarray(table.truth, np.bool_))
+    columns.file.append(np.full(len(arguments), file, np.int32))
+    columns.offset.append(np.asarray(table.offset, np.int64))
+
+
+def _each(table: FactTable, file: int, code: str, message: str, hint: str, reading: _Reading) -> None:
+    """The same mistake for every fact of a table."""
+    for offset in table.offset[:MOST_MISTAKES]:
+        reading.mistakes.append(Diagnostic(code, message, _fact_span(reading.sources[file], offset), hint))
+    more = len(table.offset) - MOST_MISTAKES
+    if more > 0:
+        reading.mistakes.append(Diagnostic(code, f"{message} ({more} more facts)"))
+
+
+def _fact_span(source: Source, offset: int) -> Span:
+    line, column = source.position(offset)
+    text = source.line(line)
+    return Span(source, offset, offset + max(1, len(text.rstrip()) - column + 1))
+
+
+# --- one predicate
+
+
+def _sorted(name: str, reading: _Reading) -> Facts:
+    """All facts of a predicate in order, each once; contradictions become mistakes."""
+    predicate = reading.predicates[name]
+    columns = reading.columns.get(name)
+    if columns is None:
+        return Facts(np.empty(0, np.int32), np.empty((0, predicate.arity), np.int32), np.empty(0, np.bool_))
+    database, arguments, truth = (np.concatenate(c) for c in (columns.database, columns.arguments, columns.truth))
+    file, offset = np.concatenate(columns.file), np.concatenate(columns.offset)
+    order = np.lexsort((*reversed(arguments.T), database))
+    database, arguments, truth, file, offset = (a[order] for a in (database, arguments, truth, file, offset))
+    again = np.zeros(len(order), bool)
+    again[1:] = (database[1:] == database[:-1]) & (arguments[1:] == arguments[:-1]).all(axis=1)
+    for i in np.flatnonzero(again & (truth != np.roll(truth, 1)))[:MOST_MISTAKES]:
+        _contradiction(predicate, reading.sources, file[i - 1 : i + 1], offset[i - 1 : i + 1], reading.mistakes)
+    keep = ~again
+    facts = Facts(database[keep], arguments[keep], truth[keep])
+    if predicate.value is not None:
+        _check_blocks(predicate, facts, (file[keep], offset[keep]), reading)
+    return facts
+
+
+def _contradiction(
+    predicate: Predicate,
+    sources: list[Source],
+    file: NDArray[np.int32],
+    offset: NDArray[np.int64],
+    mistakes: list[Diagnostic],
+) -> None:
+    spans = [_fact_span(sources[f], int(o)) for f, o in zip(file, offset, strict=True)]
+    first, second = sorted(spans, key=lambda s: (s.source.name, s.start))
+    message = f"this fact about {predicate.name} contradicts the one at {first.place}"
+    mistakes.append(Diagnostic("E304", message, second, "an atom is true or false; remove one of the two"))
+
+
+def _check_blocks(
+    predicate: Predicate, facts: Facts, where: tuple[NDArray[np.int32], NDArray[np.int64]], reading: _Reading
+) -> None:
+    """Two true values in one block of a functional predicate are a mistake."""
+    true = np.flatnonzero(facts.truth)
+    keys = np.column_stack([facts.database, facts.arguments[:, list(predicate.keys)]])[true]
+    order = np.lexsort(tuple(reversed(keys.T)))
+    keys, true = keys[order], true[order]
+    twice = np.flatnonzero((keys[1:] == keys[:-1]).all(axis=1))
+    for i in twice[:MOST_MISTAKES]:
+        file, offset = (a[true[i : i + 2]] for a in where)
+        spans = [_fact_span(reading.sources[f], int(o)) for f, o in zip(file, offset, strict=True)]
+        first, second = sorted(spans, key=lambda s: (s.source.name, s.start))
+        some = "exactly one value is" if predicate.marker == "!" else "at most one value can be"
+        message = f"this is a second value; the first is at {first.place}"
+        reading.mistakes.append(Diagnostic("E305", message, second, f"of {predicate}, {some} true"))
+
+
+# --- constants
+
+
+def _present(
+    model: Model, types: Mapping[str, Type], facts: Mapping[str, Facts], n_databases: int, reading: _Reading
+) -> dict[str, NDArray[np.bool_]]:
+    present = {}
+    for name, t in types.items():
+        present[name] = np.zeros((n_databases, len(t.constants)), np.bool_)
+        present[name][:, : len(model.types[name].constants)] = True
+    for start, stop, name, ids in reading.declared:
+        present[name][start:stop, ids] = True
+    for predicate in model.predicates.values():
+        table = facts[predicate.name]
+        for i, name in enumerate(predicate.types):
+            present[name][table.database, table.arguments[:, i]] = True
+    return present

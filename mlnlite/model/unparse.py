@@ -1,0 +1,131 @@
+"""Model back to syntax tree, so that it can be written to a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import assert_never
+
+import numpy as np
+
+from mlnlite.model import formulas as typed
+from mlnlite.model.check import with_terms
+from mlnlite.model.model import Model
+from mlnlite.model.templates import Template
+from mlnlite.syntax import tree
+from mlnlite.syntax.write import write_model
+
+
+def model_text(model: Model) -> str:
+    """The text of a model in its dialect; reading it gives the model back."""
+    return write_model(program_of(model))
+
+
+def program_of(model: Model) -> tree.Program:
+    """The syntax tree of a model: types, predicates, formulas."""
+    statements: list[tree.Statement] = []
+    for t in model.types.values():
+        if t.constants:
+            statements.append(tree.TypeDeclaration(t.name, tuple(map(tree.Constant, t.constants))))
+    for p in model.predicates.values():
+        arguments = (tree.Argument(name, p.marker if i == p.value else "") for i, name in enumerate(p.types))
+        statements.append(tree.PredicateDeclaration(p.name, tuple(arguments), p.closed))
+    for template in model.templates:
+        statements += _statements(template, model)
+    return tree.Program(tuple(statements), model.dialect)
+
+
+def _statements(template: Template, model: Model) -> Iterator[tree.Statement]:
+    if template.rows is None or not template.keys:
+        yield _statement(template, model)
+        return
+    holes: list[int] = []
+    formula = _Untyper(template, model, holes).formula()
+    names = [np.array(model.types[template.formula.variables[k].type].constants, object) for k in template.keys]
+    columns = tuple(tuple(names[k][template.rows[:, k]].tolist()) for k in holes)
+    if template.hard or template.fixed or len(template.weights) == 1 or np.isnan(template.weights).any():
+        yield from _row_by_row(template, formula, columns)
+    else:
+        weights = tuple(tree.Number(w) for w in template.weights.tolist())
+        yield tree.FormulaTable(formula, columns, weights)
+
+
+def _statement(template: Template, model: Model) -> tree.FormulaStatement:
+    names = [template.formula.variables[k].name for k in template.keys]
+    unique = tuple(tuple(names[i] for i in group) for group in template.unique)
+    formula = _Untyper(template, model, None).formula()
+    return _weighted(template, formula, float(template.weights[0]), unique)
+
+
+def _weighted(
+    template: Template, formula: tree.Formula, weight: float, unique: tuple[tuple[str, ...], ...] = ()
+) -> tree.FormulaStatement:
+    number = None if np.isnan(weight) or np.isinf(weight) else tree.Number(weight)
+    return tree.FormulaStatement(formula, number, bool(np.isinf(weight)), template.fixed, unique)
+
+
+def _row_by_row(
+    template: Template, formula: tree.Formula, columns: tuple[tuple[str, ...], ...]
+) -> Iterator[tree.FormulaStatement]:
+    for row, weight in enumerate(template.weights.tolist()):
+        constants = [column[row] for column in columns]
+        yield _weighted(template, _filled(formula, lambda hole, c=constants: tree.Constant(c[hole])), weight)
+
+
+def _filled(formula: tree.Formula, constant: Callable[[int], tree.Term]) -> tree.Formula:
+    return with_terms(formula, lambda t: constant(t.index) if isinstance(t, tree.Hole) else t)
+
+
+class _Untyper:
+    """Turns a typed formula back into syntax; keys become holes if `holes` is given, else `+` variables."""
+
+    def __init__(self, template: Template, model: Model, holes: list[int] | None) -> None:
+        self.template = template
+        self.model = model
+        self.holes = holes
+
+    def formula(self) -> tree.Formula:
+        return self._expression(self.template.formula.body)
+
+    def _expression(self, expression: typed.Expression) -> tree.Formula:
+        match expression:
+            case typed.AtomRef(index):
+                schema = self.template.formula.atoms[index]
+                types = self.model.predicates[schema.predicate].types
+                terms = tuple(self._term(a, t) for a, t in zip(schema.arguments, types, strict=True))
+                return tree.Atom(schema.predicate, terms)
+            case typed.Equal(left, right):
+                variable = left if isinstance(left, typed.Var) else right
+                assert isinstance(variable, typed.Var)
+                type_name = self.template.formula.variables[variable.index].type
+                return tree.Equality(self._term(left, type_name), self._term(right, type_name))
+            case typed.Not(typed.Exists(variables, typed.Not(body))):
+                return self._quantified("forall", variables, body)
+            case typed.Not(operand):
+                return tree.Not(self._expression(operand))
+            case typed.All(operands):
+                return tree.And(tuple(map(self._expression, operands)))
+            case typed.Any((typed.Not(body), head)):
+                return tree.Implies(self._expression(body), self._expression(head))
+            case typed.Any(operands):
+                return tree.Or(tuple(map(self._expression, operands)))
+            case typed.Iff(left_side, right_side):
+                return tree.Iff(self._expression(left_side), self._expression(right_side))
+            case typed.Exists(variables, body):
+                return self._quantified("exist", variables, body)
+            case _:
+                assert_never(expression)
+
+    def _quantified(self, quantifier: str, variables: tuple[int, ...], body: typed.Expression) -> tree.Formula:
+        names = tuple(self.template.formula.variables[v].name for v in variables)
+        return tree.Quantified("exist" if quantifier == "exist" else "forall", names, self._expression(body))
+
+    def _term(self, term: typed.Argument, type_name: str) -> tree.Term:
+        if isinstance(term, typed.Const):
+            return tree.Constant(self.model.types[type_name].constants[term.id])
+        variable = self.template.formula.variables[term.index]
+        if term.index not in self.template.keys:
+            return tree.Variable(variable.name)
+        if self.holes is None:
+            return tree.Variable(variable.name, plus=True)
+        self.holes.append(self.template.keys.index(term.index))
+        return tree.Hole(len(self.holes) - 1)
