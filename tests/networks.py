@@ -41,7 +41,9 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
     for b in (*clause_blocks, *table_blocks):
         np.add.at(total, b.weight, b.count)
     templates = tuple(
-        Template(f"formula {i + 1}", Formula((), (), Any((AtomRef(0),))), (), None, np.array([w], float), text=f"f{i + 1}")
+        Template(
+            f"formula {i + 1}", Formula((), (), Any((AtomRef(0),))), (), None, np.array([w], float), text=f"f{i + 1}"
+        )
         for i, w in enumerate(weights)
     )
     return Network(

@@ -25,7 +25,9 @@ def clique_tables(tree: Tree, cardinality: Int32, cells: Sequence[Cells]) -> Ite
     Small tables of equal shape are filled together, large ones when their turn comes.
     """
     shapes = [tuple(cardinality[list(scope)].tolist()) for scope in tree.scopes]
-    keys = [(shape, -1 if size <= _BATCHED else k) for k, (shape, size) in enumerate(zip(shapes, tree.sizes, strict=True))]
+    keys = [
+        (shape, -1 if size <= _BATCHED else k) for k, (shape, size) in enumerate(zip(shapes, tree.sizes, strict=True))
+    ]
     batches: dict[tuple[tuple[int, ...], int], list[int]] = {}
     for k, key in enumerate(keys):
         batches.setdefault(key, []).append(k)
@@ -94,9 +96,7 @@ def _combined(tree: Tree, cardinality: Int32, cells: Sequence[Cells]) -> Iterato
         inbox.setdefault(tree.parents[k], []).append(out[0].reshape(shapes[k]))
 
 
-def log_sum(
-    tree: Tree, cardinality: Int32, cells: Sequence[Cells], wanted: Bool
-) -> tuple[float, dict[int, Float]]:
+def log_sum(tree: Tree, cardinality: Int32, cells: Sequence[Cells], wanted: Bool) -> tuple[float, dict[int, Float]]:
     """Log of the sum of the weights of all worlds, and the distribution of each wanted variable.
 
     Args:
@@ -136,9 +136,7 @@ def _on_the_way(tree: Tree, wanted: Bool) -> list[bool]:
     return needed
 
 
-def _downward(
-    tree: Tree, cardinality: Int32, conditional: dict[int, Float], wanted: Bool
-) -> dict[int, Float]:
+def _downward(tree: Tree, cardinality: Int32, conditional: dict[int, Float], wanted: Bool) -> dict[int, Float]:
     """Distributions of the wanted variables, from `P(eliminated | kept)` of each clique, roots first."""
     kept: dict[int, Float] = {}
     children: dict[int, list[int]] = {}

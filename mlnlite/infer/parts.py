@@ -94,9 +94,7 @@ def divide(potentials: Potentials, small: int = SMALL) -> Division:
     order = np.lexsort((np.where(is_small[label], potentials.cardinality, 0), label))
     starts = np.searchsorted(label[order], np.arange(n + 1))
     sizes = potentials.cardinality[order]
-    keys = [
-        tuple(sizes[starts[i] : starts[i + 1]].tolist()) if is_small[i] else None for i in range(n)
-    ]
+    keys = [tuple(sizes[starts[i] : starts[i + 1]].tolist()) if is_small[i] else None for i in range(n)]
     by_rank = sorted(range(n), key=lambda i: (keys[i] is None, keys[i] or (), i))
     rank = np.empty(n, np.int64)
     rank[by_rank] = np.arange(n)
@@ -170,5 +168,6 @@ def parts(division: Division, take: Bool) -> Iterator[Part]:
             cells = tuple(
                 Cells(local[c.scope[b[r] : b[r + 1]]], c.value[b[r] : b[r + 1]], c.amount[b[r] : b[r + 1]])
                 for c, b in zip(division.cells, division.cell_starts, strict=True)
+                if b[r] < b[r + 1]
             )
             yield Part(int(number[r]), variables, division.potentials.cardinality[variables], cells)

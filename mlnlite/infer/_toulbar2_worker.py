@@ -1,0 +1,54 @@
+"""The process that runs toulbar2: problems come in on standard input, answers go out on standard output.
+
+toulbar2 holds the interpreter lock while it solves, keeps its options in globals and prints where it likes, so it gets
+a process of its own: `python -m mlnlite.infer._toulbar2_worker`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from typing import Any
+
+from pytoulbar2 import CFN
+
+
+def main() -> None:
+    """Reads one problem per line, writes one answer per line."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        answers.write(json.dumps(solve(json.loads(line))) + "\n")
+        answers.flush()
+
+
+def solve(problem: dict[str, Any]) -> dict[str, Any]:
+    """Minimises a sum of integer costs.
+
+    Args:
+        problem: `cardinality` of each variable; `functions` as [scope, default cost, cells, costs], cells being lists
+            of values and a cost of null forbidding the cell; `seconds`, 0 for no limit; `seed`.
+
+    Returns:
+        `state` and its `cost`, null if none was found; `bound`, the least that any state costs, null if unknown;
+        `optimal`, whether the state is proved to be one of least cost.
+    """
+    network = CFN(resolution=0, seed=problem["seed"], vac=0, verbose=-1)
+    for v, size in enumerate(problem["cardinality"]):
+        network.AddVariable(f"v{v}", range(size))
+    try:
+        for scope, default, cells, costs in problem["functions"]:
+            network.AddCompactFunction(scope, default, cells, [network.Top if c is None else c for c in costs])
+        found = network.Solve(timeLimit=problem["seconds"])
+    except network.Contradiction:
+        found = None
+    if found is None:
+        return {"state": None, "cost": None, "bound": None, "optimal": False}
+    state, cost = list(found[0]), int(found[1])
+    bound = int(network.GetDDualBound())
+    return {"state": state, "cost": cost, "bound": bound, "optimal": bound >= cost}
+
+
+if __name__ == "__main__":
+    main()

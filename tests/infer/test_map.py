@@ -1,0 +1,48 @@
+"""Best worlds against listing all worlds, and one method against another."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from mlnlite.errors import Contradiction
+from mlnlite.infer import map as map_module
+from mlnlite.infer import parts
+from mlnlite.infer.map import map_of
+from tests.networks import networks, world_weight, worlds
+
+
+def best_weight(net):
+    return max(world_weight(net, t) for t in worlds(net))
+
+
+@pytest.mark.parametrize("small", [1, 1024])
+@settings(max_examples=150, deadline=None)
+@given(net=networks())
+def test_best_world_equals_enumeration(net, small):
+    expected = best_weight(net)
+    divide = parts.divide
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(map_module, "divide", lambda p, small_=0, **_: divide(p, small))
+        if np.isneginf(expected):
+            with pytest.raises(Contradiction):
+                map_of(net)
+            return
+        answer = map_of(net)
+    assert answer.log_weight == pytest.approx(expected, abs=1e-9)
+    assert answer.log_weight == pytest.approx(world_weight(net, answer.truth), abs=1e-9)
+    assert answer.bound == answer.log_weight
+    assert answer.status == "optimal"
+
+
+@settings(max_examples=25, deadline=None)
+@given(net=networks())
+def test_toulbar2_equals_enumeration(net):
+    expected = best_weight(net)
+    if np.isneginf(expected):
+        with pytest.raises(Contradiction):
+            map_of(net, method="wcsp")
+        return
+    answer = map_of(net, method="wcsp")
+    assert answer.log_weight == pytest.approx(expected, abs=1e-9)
+    assert answer.status == "optimal"
+    assert 0 <= answer.gap < 1e-6
