@@ -1,0 +1,190 @@
+"""From the text of an evidence file to its `EvidenceProgram`: facts as columns, a million of them in seconds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from mlnlite.errors import Diagnostic, SyntaxMistake
+from mlnlite.source import Source, Span
+from mlnlite.syntax.build import Fact
+from mlnlite.syntax.grammar import parse_node
+from mlnlite.syntax.includes import ANY_INCLUDE, File, load
+from mlnlite.syntax.lines import split_statements
+from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.tree import Dialect, EvidenceProgram, FactTable, TypeDeclaration
+
+MAX_MISTAKES = 100
+# A fact on a line of its own whose constants are plain words: a subset of what the grammar accepts.
+_WORD = r" *+-?\w++(?:[-.]\w++)*+ *+"
+_FACT = re.compile(rf"^[ \t]*+(!?)([^\W\d]\w*+)\(({_WORD}(?:,{_WORD})*+)\)[ \t\r]*+$", re.MULTILINE)
+_TYPE = re.compile(r"[^\W\d][\w'-]*\s*=\s*\{")
+
+
+@dataclass(slots=True)
+class _Rows:
+    """A fact table that grows; the arguments of facts read by the pattern stay together, uncut, until many are there."""
+
+    columns: tuple[list[str], ...]
+    truth: list[bool] = field(default_factory=list)
+    database: list[int] = field(default_factory=list)
+    offset: list[int] = field(default_factory=list)
+    uncut: list[str] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Reading:
+    """What has been read so far.
+
+    Attributes:
+        rows: the facts by predicate and number of arguments.
+        constants: every constant once, so that equal ones share one string.
+        types: the type declarations.
+        database: number of the database that is being read.
+        separator: a `---` after which nothing has been read yet.
+        offset: where facts stand if they come from an included file: at its `#include`.
+        mistakes: what was wrong so far.
+    """
+
+    rows: dict[tuple[str, int], _Rows] = field(default_factory=dict)
+    constants: dict[str, str] = field(default_factory=dict)
+    types: list[TypeDeclaration] = field(default_factory=list)
+    database: int = 0
+    separator: bool = False
+    offset: int | None = None
+    mistakes: list[Diagnostic] = field(default_factory=list)
+
+
+def parse_evidence(source: Source, dialect: Dialect) -> EvidenceProgram:
+    """The facts of an evidence file; every argument is a constant in both dialects.
+
+    `---` alone on a line starts the next database. Facts of an included file belong to the database of the `#include`; as their
+    place counts that of the `#include`.
+
+    Args:
+        source: the file.
+        dialect: the dialect of the model, for messages.
+
+    Raises:
+        SyntaxMistake: with every mistake in the file.
+    """
+    reading = _Reading()
+    file = load(source)
+    reading.mistakes += file.mistakes
+    _read_file(file, dialect, reading)
+    if reading.mistakes:
+        raise SyntaxMistake(reading.mistakes)
+    n_databases = reading.database + (not reading.separator)
+    span = Span(source, 0, len(source.text))
+    return EvidenceProgram(tuple(_tables(reading)), tuple(reading.types), n_databases, span)
+
+
+def _tables(reading: _Reading) -> Iterator[FactTable]:
+    for (predicate, _), rows in reading.rows.items():
+        _cut(rows, reading.constants)
+        yield FactTable(predicate, rows.columns, rows.truth, rows.database, rows.offset)
+
+
+def _read_file(file: File, dialect: Dialect, reading: _Reading) -> None:
+    """Plain facts by one pattern, the stretches between them statement by statement."""
+    done, text, included_at = 0, file.code.text, reading.offset
+    for match in _FACT.finditer(text):
+        sign, predicate, arguments = match.groups()
+        start = match.start(1)
+        if start - done > 1 and not text[done:start].isspace():
+            _read_between(file, done, start, dialect, reading)
+            if len(reading.mistakes) > MAX_MISTAKES:
+                return
+        done = match.end()
+        rows = _rows(reading, predicate, arguments.count(",") + 1)
+        rows.uncut.append(arguments)
+        rows.truth.append(not sign)
+        rows.database.append(reading.database)
+        rows.offset.append(start if included_at is None else included_at)
+        reading.separator = False
+    _read_between(file, done, len(text), dialect, reading)
+
+
+def _rows(reading: _Reading, predicate: str, n_arguments: int) -> _Rows:
+    rows = reading.rows.get((predicate, n_arguments))
+    if rows is None:
+        rows = reading.rows[predicate, n_arguments] = _Rows(tuple([] for _ in range(n_arguments)))
+    return rows
+
+
+def _add(reading: _Reading, fact: Fact, positive: bool, offset: int) -> None:
+    rows = _rows(reading, fact.predicate, len(fact.arguments))
+    _cut(rows, reading.constants)
+    for column, name in zip(rows.columns, fact.arguments, strict=True):
+        column.append(reading.constants.setdefault(name, name))
+    rows.truth.append(positive)
+    rows.database.append(reading.database)
+    rows.offset.append(offset if reading.offset is None else reading.offset)
+
+
+def _cut(rows: _Rows, constants: dict[str, str]) -> None:
+    """Moves the uncut arguments into the columns, many at once."""
+    if rows.uncut:
+        words = ",".join(rows.uncut).replace(" ", "").split(",")
+        shared = list(map(constants.setdefault, words, words))
+        for number, column in enumerate(rows.columns):
+            column += shared[number :: len(rows.columns)]
+        rows.uncut.clear()
+
+
+def _read_between(file: File, start: int, end: int, dialect: Dialect, reading: _Reading) -> None:
+    for first, last in split_statements(file.code, start, end):
+        if len(reading.mistakes) >= MAX_MISTAKES:
+            reading.mistakes.append(mistake("E199", Span(file.code.source, first, last), limit=MAX_MISTAKES))
+            return
+        try:
+            _read_statement(file, first, last, dialect, reading)
+        except SyntaxMistake as error:
+            reading.mistakes += error.diagnostics
+
+
+def _read_statement(file: File, start: int, end: int, dialect: Dialect, reading: _Reading) -> None:
+    source, text = file.code.source, file.code.text[start:end]
+    if text == "---":
+        reading.database += 1
+        reading.separator = True
+        return
+    reading.separator = False
+    if text.startswith("#"):
+        _read_include(file, start, end, dialect, reading)
+    elif text.startswith("---"):
+        raise SyntaxMistake([mistake("E147", Span(source, start, end), "put `---` alone on its line", found=text)])
+    elif _TYPE.match(text):
+        reading.types.append(parse_node("type_declaration", text, source, start, dialect, evidence=True))
+    else:
+        fact: Fact = parse_node("fact", text, source, start, dialect, evidence=True)
+        _add(reading, fact, fact.positive == _truth(fact), start)
+
+
+def _truth(fact: Fact) -> bool:
+    """Whether the number in front of a fact, if any, says that it is true."""
+    if fact.truth is None:
+        return True
+    if fact.truth in (0.0, 1.0):
+        return fact.truth == 1.0
+    if 0.0 < fact.truth < 1.0:
+        hint = "decide whether it is true, or leave it out; a belief can be put into the model as a weighted formula"
+        raise SyntaxMistake([mistake("E144", fact.span, hint, found=f"{fact.truth:g}")])
+    raise SyntaxMistake([mistake("E148", fact.span, "weights belong to the formulas of the model", found=f"{fact.truth:g}")])
+
+
+def _read_include(file: File, start: int, end: int, dialect: Dialect, reading: _Reading) -> None:
+    text, span = file.code.text[start:end], Span(file.code.source, start, end)
+    if start in file.included:
+        included = file.included[start][1]
+        if included:
+            outer, reading.offset = reading.offset, start if reading.offset is None else reading.offset
+            _read_file(included, dialect, reading)
+            reading.offset = outer
+    elif ANY_INCLUDE.match(text):
+        hint = 'write `#include "file.db"`'
+        raise SyntaxMistake([mistake("E112", span, hint, directive="#include", problem="needs the name of a file")])
+    else:
+        hint = "a comment starts with `//`; the only directive of evidence is `#include`"
+        raise SyntaxMistake([mistake("E111", span, hint, found=text.split()[0])])

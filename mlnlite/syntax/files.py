@@ -1,0 +1,77 @@
+"""From a path to a `Source`: what can be wrong with a file is found here."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from mlnlite.errors import Diagnostic, SyntaxMistake, did_you_mean
+from mlnlite.source import Source, Span
+from mlnlite.syntax.messages import mistake
+
+MAX_BYTES = 256 * 1024 * 1024
+_BOM = b"\xef\xbb\xbf"
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def read_source(path: str | os.PathLike[str]) -> Source:
+    """The text of a UTF-8 file, under the name that its path has here.
+
+    A byte-order mark at its start is dropped, line ends become `\\n`.
+
+    Raises:
+        SyntaxMistake: no such file, a folder, not readable, empty, too large, or not UTF-8 text.
+    """
+    name = os.fspath(path)
+    data = _bytes(name)
+    if not data.strip():
+        raise _refusal(mistake("E134", None, "a model or an evidence file has at least one line", path=name))
+    zero = -1 if data.startswith(_UTF16) else data.find(b"\0")
+    if zero >= 0:
+        raise _refusal(mistake("E132", None, "give a .mln or .db text file", path=name, offset=zero))
+    return Source(name, _decoded(name, data).replace("\r\n", "\n").replace("\r", "\n"))
+
+
+def _bytes(name: str) -> bytes:
+    path = Path(name)
+    try:
+        if path.is_dir():
+            raise _refusal(mistake("E131", None, "give the name of a file in it", path=name))
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            sizes = {"size": size // 2**20, "limit": MAX_BYTES // 2**20}
+            raise _refusal(mistake("E135", None, "split it into several files", path=name, **sizes))
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise _refusal(mistake("E130", None, similar_file(path), path=name)) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise _refusal(mistake("E136", None, path=name, reason=reason)) from None
+
+
+def similar_file(path: Path) -> str:
+    """A hint with files of nearly the same name in the same folder."""
+    try:
+        names = sorted(entry.name for entry in path.parent.iterdir() if entry.is_file())
+    except OSError:
+        return f"there is no folder `{path.parent}` either"
+    return did_you_mean(path.name, names)
+
+
+def _decoded(name: str, data: bytes) -> str:
+    body = data.removeprefix(_BOM)
+    try:
+        return body.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = body[: error.start].decode("utf-8").replace("\r\n", "\n")
+        line = body[error.start :].split(b"\n", 1)[0].decode("utf-8", errors="replace")
+        span = Span(Source(name, before + line), len(before), len(before) + 1)
+        utf16 = data.startswith(_UTF16)
+        hint = "it looks like UTF-16: save it as UTF-8" if utf16 else "save it with the encoding UTF-8"
+        place = None if utf16 else span
+        detail = {"path": name, "byte": body[error.start], "offset": error.start + len(data) - len(body)}
+        raise _refusal(mistake("E133", place, hint, **detail)) from None
+
+
+def _refusal(diagnostic: Diagnostic) -> SyntaxMistake:
+    return SyntaxMistake([diagnostic])

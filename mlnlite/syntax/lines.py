@@ -1,0 +1,85 @@
+"""From a source to its statements: comments become blanks, and lines are joined to statements. Offsets never change."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mlnlite.errors import Diagnostic
+from mlnlite.source import Source, Span
+from mlnlite.syntax.messages import mistake
+
+# A line that ends like this goes on in the next one.
+_GOES_ON = ("^", "=>", "=", "!", ",", "(", "{", " v", ")v", "->", "&", "|", " and", " or", "∧", "∨", "→", "⇒")
+_EQUALS_V = re.compile(r"=\s*v$")
+_NEW_STATEMENT = re.compile(r"#|@|\*\w|[-+]?[.\d][^\s(),]*\s+[!(?]*\w|\w+\s*=\s*\{|(?:log|logx|logit|ln|exp|sqrt)\([^\s]*\)\s+[!(?\w]")
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """A source without what the grammar does not see.
+
+    Attributes:
+        source: the source.
+        text: its text with every character of a comment replaced by a blank.
+        bare: the same, and every character of a quoted constant replaced by `_`.
+    """
+
+    source: Source
+    text: str
+    bare: str
+
+
+_COMMENT_OR_QUOTE = re.compile(r'//[^\n]*|/\*.*?(?:\*/|\Z)|"(?:[^"\\\n]|\\[^\n])*"', re.DOTALL)
+_VISIBLE = re.compile(r"[^\n]")
+
+
+def strip_comments(source: Source) -> tuple[Code, list[Diagnostic]]:
+    """The code of a source, and a mistake if a comment is never closed."""
+    text = source.text
+    if "//" not in text and "/*" not in text and '"' not in text:
+        return Code(source, text, text), []
+    code = _COMMENT_OR_QUOTE.sub(lambda m: m[0] if m[0][0] == '"' else _VISIBLE.sub(" ", m[0]), text)
+    bare = _COMMENT_OR_QUOTE.sub(lambda m: "_" * len(m[0]), code) if '"' in code else code
+    return Code(source, code, bare), list(_unclosed(source)) if "/*" in text else []
+
+
+def _unclosed(source: Source) -> Iterator[Diagnostic]:
+    for match in _COMMENT_OR_QUOTE.finditer(source.text):
+        if match[0].startswith("/*") and (len(match[0]) < 4 or not match[0].endswith("*/")):
+            hint = "everything after it is taken as comment; write `*/` where the comment ends"
+            yield mistake("E113", Span(source, match.start(), match.start() + 2), hint)
+
+
+def _goes_on(text: str) -> bool:
+    return text.endswith(_GOES_ON) and not _EQUALS_V.search(text)
+
+
+def split_statements(code: Code, first: int = 0, last: int | None = None) -> Iterator[tuple[int, int]]:
+    """Start and end offset of each statement between the offsets `first` and `last`.
+
+    A statement ends with its line, unless a parenthesis or brace is open or the line ends in a connective. A blank line,
+    or a line that is clearly another statement, ends it even then, so that one mistake does not swallow the file.
+    """
+    start, end, depth, offset = -1, 0, 0, first
+    for line in code.bare[first:last].split("\n"):
+        text = line.strip()
+        if text:
+            if start >= 0 and _NEW_STATEMENT.match(text):
+                yield start, end
+                start = -1
+            left = offset + line.index(text[0])
+            if start < 0:
+                start, depth = left, 0
+            end = left + len(text)
+            depth += text.count("(") + text.count("{") - text.count(")") - text.count("}")
+            if (depth <= 0 and not _goes_on(text)) or text[0] == "#":
+                yield start, end
+                start = -1
+        elif start >= 0 and not code.source.text[offset : offset + len(line)].strip():
+            yield start, end
+            start = -1
+        offset += len(line) + 1
+    if start >= 0:
+        yield start, end

@@ -1,0 +1,64 @@
+"""What can be wrong with a text: the table of stable codes, each with the sentence that its user reads."""
+
+from __future__ import annotations
+
+from mlnlite.errors import Diagnostic
+from mlnlite.source import Span
+
+MESSAGES: dict[str, str] = {
+    # any statement
+    "E101": "found {found}, expected {expected}",
+    "E102": "the statement ends too early: expected {expected}",
+    "E103": "the parenthesis is not closed: {found}, expected {expected}",
+    "E104": "this `{found}` closes nothing",
+    "E105": "`{found}` is not an operator here",
+    "E106": "a chain of `{operator}` has no agreed reading without parentheses",
+    "E107": "a hard formula (with a final dot) has no weight",
+    "E108": "the weight `{weight}` is not separated from its formula",
+    "E109": "a second statement on the same line, starting at {found}",
+    "E110": "{construct} is not supported",
+    "E111": "unknown directive `{found}`",
+    "E112": "`{directive}` {problem}",
+    "E113": "the comment that starts here is never closed",
+    "E114": "the quote that starts here is not closed on this line",
+    "E115": "{found} is not a character of the language",
+    "E116": "nested deeper than {limit} levels",
+    "E117": "`{bare}` is written like a variable of the standard dialect, but `{marked}` ({place}) is one of the prac dialect",
+    "E118": "the text is written in the {actual} dialect, but is to be read in the {asked} dialect: `{found}` {meaning}",
+    "E119": "the formula has a constant `{name}` and a variable `?{name}`",
+    "E120": "`{name}` is a variable here, but {place} declares it as a constant of `{type}`",
+    "E121": "the weight `{weight}` has no formula after it",
+    "E122": "`{found}` is not a function that a weight can use",
+    "E123": "the number `{found}` is too large",
+    "E124": "`{found}` is neither a variable nor a constant of the standard dialect",
+    "E125": "`+{name}` asks for one weight for each constant, but `{name}` is a constant already",
+    "E126": "`{name}()` has empty parentheses",
+    # files
+    "E130": "there is no file `{path}`",
+    "E131": "`{path}` is a folder, not a file",
+    "E132": "`{path}` is not a text file: byte {offset} is zero",
+    "E133": "`{path}` is not UTF-8 text: byte 0x{byte:02x} at offset {offset} cannot be read",
+    "E134": "`{path}` is empty",
+    "E135": "`{path}` has {size} MB; at most {limit} MB can be read at once",
+    "E136": "`{path}` cannot be read: {reason}",
+    "E137": "the file to include, `{path}`, does not exist",
+    "E138": "this file includes itself: {chain}",
+    "E139": "files are included more than {limit} deep",
+    # evidence
+    "E141": "a second fact on the same line, starting at {found}",
+    "E142": "a formula where a fact was expected: found {found} after the fact",
+    "E143": "a fact does not end with a dot",
+    "E144": "soft evidence is not supported yet: the truth of this fact is {found}",
+    "E145": "unknown facts (`?{name}...`) are not supported yet",
+    "E146": "`{found}` is a variable, but every argument of a fact is a constant",
+    "E147": "databases are separated by exactly three dashes alone on a line, found `{found}`",
+    "E148": "{found} is not a truth value",
+    # queries
+    "E150": "an item of the query is empty",
+    "E199": "more than {limit} mistakes; the rest of the file was not read",
+}
+
+
+def mistake(code: str, span: Span | None, hint: str = "", **words: object) -> Diagnostic:
+    """The diagnostic of `code` with `words` filled into its sentence."""
+    return Diagnostic(code, MESSAGES[code].format(**words), span, hint)

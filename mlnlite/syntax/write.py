@@ -1,0 +1,222 @@
+"""Syntax trees to text. What is written reads the same again, and the same in both precedences of `^` and `v`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import assert_never
+
+from mlnlite.syntax import tree
+from mlnlite.syntax.build import is_variable
+from mlnlite.syntax.statements import declares
+from mlnlite.syntax.walk import variables_of
+
+_WORD = re.compile(r"-?\w+(?:[-.]\w+)*")
+# Names that stand alone on the left of `=`, where a number would be taken for a weight.
+_NAME = re.compile(r"(?!inf$)[^\W\d]\w*")
+
+
+def write_model(program: tree.Program) -> str:
+    """The text of a program; of an included file only its `#include`."""
+    plain = _plain_words(program)
+    declared: dict[str, tree.PredicateDeclaration] = {}
+    lines: list[str] = []
+    for statement in program.statements:
+        if isinstance(statement, tree.PredicateDeclaration):
+            declared.setdefault(statement.name, statement)
+        lines += _statement(statement, plain, declared)
+    return "".join(f"{line}\n" for line in lines)
+
+
+def write_formula(formula: tree.Formula, dialect: tree.Dialect) -> str:
+    """The text of a formula. `Hole(0)` of a formula table is written `<1>`, which does not read back."""
+    return _formula(formula, _word_writer(dialect, variables_of(formula) != []))
+
+
+def write_weight(weight: tree.WeightExpression) -> str:
+    """The text of a weight, without blanks.
+
+    >>> write_weight(tree.Arithmetic("*", tree.Number(2), tree.Call("log", (tree.Number(0.5),))))
+    '2*log(0.5)'
+    """
+    match weight:
+        case tree.Number(value):
+            return _number(value)
+        case tree.Call(function, arguments):
+            return f"{function}({','.join(map(write_weight, arguments))})"
+        case tree.Arithmetic(operator, left, right):
+            return ("" if left is None else _operand(left)) + operator + _operand(right)
+    assert_never(weight)
+
+
+def write_evidence(evidence: tree.EvidenceProgram, dialect: tree.Dialect) -> str:
+    """The text of an evidence file: types first, then each database, `---` between them."""
+    lines = [_type(declaration) for declaration in evidence.types]
+    facts: list[list[str]] = [[] for _ in range(evidence.n_databases)]
+    for table in evidence.facts:
+        words = [list(map(_constant, column)) for column in table.columns]
+        rows = zip(*words, strict=True) if words else iter([()] * len(table.truth))
+        for arguments, truth, database in zip(rows, table.truth, table.database, strict=True):
+            text = f"{table.predicate}({', '.join(arguments)})" if arguments else table.predicate
+            facts[database].append(text if truth else f"!{text}")
+    for number, database_lines in enumerate(facts):
+        lines += ["---"] * (number > 0) + database_lines
+    # A separator that nothing follows counts only if another one follows.
+    lines += ["---"] * (len(facts) > 1 and not facts[-1])
+    return "".join(f"{line}\n" for line in lines)
+
+
+# --- words
+
+# A term, and whether it stands on the left of `=`.
+_WriteWord = Callable[[tree.Term, bool], str]
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _constant(name: str) -> str:
+    return name if _WORD.fullmatch(name) else _quoted(name)
+
+
+def _word_writer(dialect: tree.Dialect, has_variables: bool) -> _WriteWord:
+    """How to write terms. Lower-case constants are quoted unless `?x` elsewhere shows that they are none."""
+    plain = dialect == "prac" and has_variables
+    sign = "?" if dialect == "prac" else ""
+
+    def write(term: tree.Term, left: bool) -> str:
+        match term:
+            case tree.Variable(name, plus):
+                return f"{'+' if plus else ''}{sign}{name}"
+            case tree.Constant(name):
+                readable = (_NAME if left else _WORD).fullmatch(name) and (plain or not is_variable(name))
+                return name if readable else _quoted(name)
+            case tree.Hole(index):
+                return f"<{index + 1}>"
+        assert_never(term)
+
+    return write
+
+
+def _plain_words(program: tree.Program) -> _WriteWord:
+    """The writer of terms for a whole program."""
+    return _word_writer(program.dialect, any(variables_of(formula) for formula in _formulas(program)))
+
+
+def _formulas(program: tree.Program) -> Iterator[tree.Formula]:
+    for statement in program.statements:
+        if isinstance(statement, tree.FormulaStatement | tree.FormulaTable):
+            yield statement.formula
+
+
+# --- formulas
+
+
+def _formula(formula: tree.Formula, word: _WriteWord) -> str:
+    match formula:
+        case tree.Atom(predicate, arguments):
+            return f"{predicate}({', '.join(word(argument, False) for argument in arguments)})" if arguments else predicate
+        case tree.Equality():
+            text = f"{word(formula.left, True)} = {word(formula.right, False)}"
+            return f"({text})" if text.startswith("+") else text
+        case tree.Not(tree.Atom() as atom):
+            return "!" + _formula(atom, word)
+        case tree.Not(operand):
+            return f"!({_formula(operand, word)})"
+        case tree.And(operands):
+            return " ^ ".join(_part(operand, word) for operand in operands)
+        case tree.Or(operands):
+            return " v ".join(_part(operand, word) for operand in operands)
+        case tree.Implies(body, head):
+            return f"{_side(body, word)} => {_side(head, word)}"
+        case tree.Iff(left, right):
+            return f"{_side(left, word)} <=> {_side(right, word)}"
+        case tree.Quantified(quantifier, variables, body):
+            names = ",".join(word(tree.Variable(name), False) for name in variables)
+            return f"{quantifier.upper()} {names} ({_formula(body, word)})"
+    assert_never(formula)
+
+
+def _part(operand: tree.Formula, word: _WriteWord) -> str:
+    """An operand of `^` or `v`: anything with a connective of its own is put into parentheses."""
+    text = _formula(operand, word)
+    return f"({text})" if isinstance(operand, tree.And | tree.Or | tree.Implies | tree.Iff) else text
+
+
+def _side(operand: tree.Formula, word: _WriteWord) -> str:
+    """A side of `=>` or `<=>`."""
+    text = _formula(operand, word)
+    return f"({text})" if isinstance(operand, tree.Implies | tree.Iff) else text
+
+
+# --- weights
+
+
+def _number(value: float) -> str:
+    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+
+
+def _operand(weight: tree.WeightExpression) -> str:
+    text = write_weight(weight)
+    return f"({text})" if isinstance(weight, tree.Arithmetic) or text.startswith("-") else text
+
+
+# --- statements
+
+
+def _statement(
+    statement: tree.Statement, word: _WriteWord, declared: Mapping[str, tree.PredicateDeclaration]
+) -> Iterator[str]:
+    match statement:
+        case tree.TypeDeclaration():
+            yield _type(statement)
+        case tree.PredicateDeclaration(name, arguments, closed):
+            words = ", ".join(argument.type + argument.marker for argument in arguments)
+            yield f"{'*' if closed else ''}{name}" + (f"({words})" if arguments else "")
+        case tree.FormulaStatement():
+            yield from _weighted(statement, word, declared)
+        case tree.FormulaTable():
+            yield from _rows(statement, word)
+        case tree.Include(path):
+            yield f"#include <{path}>" if '"' in path else f'#include "{path}"'
+        case _:
+            assert_never(statement)
+
+
+def _type(declaration: tree.TypeDeclaration) -> str:
+    return f"{declaration.name} = {{{', '.join(_constant(c.name) for c in declaration.constants)}}}"
+
+
+def _weighted(
+    statement: tree.FormulaStatement, word: _WriteWord, declared: Mapping[str, tree.PredicateDeclaration]
+) -> Iterator[str]:
+    for group in statement.unique:
+        yield f"#unique{{{','.join(word(tree.Variable(name, plus=True), False) for name in group)}}}"
+    if statement.fixed and statement.weight is None:
+        yield "#fixweight"
+    text = _formula(statement.formula, word)
+    if statement.weight is not None:
+        yield f"{'@' if statement.fixed else ''}{write_weight(statement.weight)} {text}"
+    elif statement.hard:
+        yield f"{text}."
+    else:
+        yield f"({text})" if declares(text, declared) else text
+
+
+def _rows(table: tree.FormulaTable, word: _WriteWord) -> Iterator[str]:
+    """One line for each row: the text of the shape, cut at its holes, with the words of the row between."""
+    sides: list[tuple[int, bool]] = []
+
+    def cut(term: tree.Term, left: bool) -> str:
+        if not isinstance(term, tree.Hole):
+            return word(term, left)
+        sides.append((term.index, left))
+        return "\0"
+
+    first, *texts = _formula(table.formula, cut).split("\0")
+    columns = [[word(tree.Constant(name), left) for name in table.columns[index]] for index, left in sides]
+    words = zip(*columns, strict=True) if columns else iter([()] * len(table.weights))
+    for weight, row in zip(table.weights, words, strict=True):
+        yield f"{write_weight(weight)} {first}" + "".join(a + b for a, b in zip(row, texts, strict=True))
