@@ -1,4 +1,4 @@
-"""Why no world is possible: comes in a network, goes out a `Contradiction` that names formulas that exclude each other."""
+"""Why no world is possible: comes in a network, goes out a `Contradiction` naming formulas."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
-from pysat.solvers import Solver
+from pysat.solvers import Solver  # type: ignore[import-untyped]
 
 from mlnlite.errors import Contradiction, Diagnostic
 from mlnlite.ground.network import Network
+from mlnlite.infer.potentials import decided_false
 
 
 def contradiction(network: Network) -> Contradiction:
@@ -18,7 +19,7 @@ def contradiction(network: Network) -> Contradiction:
     It names every template of a set of hard formulas that exclude each other and that is as small as leaving out one
     after the other can make it. (Formulas of which evidence alone makes a grounding false are named without search.)
     """
-    weights = _decided_false(network)
+    weights = decided_false(network).tolist()
     decided = bool(weights)
     templates = sorted({int(network.template[w]) for w in weights or _core(network)})
     named = [network.model.templates[t] for t in templates]
@@ -35,17 +36,8 @@ def contradiction(network: Network) -> Contradiction:
     )
 
 
-def _decided_false(network: Network) -> list[int]:
-    """Hard weights of which evidence makes a grounding false."""
-    open_count = np.zeros(len(network.weights), np.int64)
-    for block in (*network.clauses, *network.tables):
-        np.add.at(open_count, block.weight, block.count)
-    hard = np.isposinf(network.weights)
-    return np.flatnonzero(hard & (network.decided_true + open_count < network.n_groundings)).tolist()
-
-
 def _core(network: Network) -> list[int]:
-    """Hard weights that exclude each other: the solver's core, then each left out in turn if the rest still conflicts."""
+    """Hard weights that exclude each other: the solver's core, less each that can be left out."""
     first = network.n_atoms + 1
     with Solver(name="cadical153") as solver:
         for literals in _blocks(network):

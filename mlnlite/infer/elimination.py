@@ -1,4 +1,4 @@
-"""Elimination on a clique tree, in logarithms: sums for marginals and the partition function, maxima for the best world.
+"""Elimination on a clique tree, in logarithms: sums for marginals and log Z, maxima for the best world.
 
 Comes in a component as cells and a plan (`order.plan`), goes out the log of the sum, or the maximum, over all its
 worlds, with the distribution of each variable or a best world.
@@ -25,9 +25,7 @@ def clique_tables(tree: Tree, cardinality: Int32, cells: Sequence[Cells]) -> Ite
     Small tables of equal shape are filled together, large ones when their turn comes.
     """
     shapes = [tuple(cardinality[list(scope)].tolist()) for scope in tree.scopes]
-    keys = [
-        (shape, -1 if size <= _BATCHED else k) for k, (shape, size) in enumerate(zip(shapes, tree.sizes, strict=True))
-    ]
+    keys = [(shape, -1 if tree.sizes[k] <= _BATCHED else k) for k, shape in enumerate(shapes)]
     batches: dict[tuple[tuple[int, ...], int], list[int]] = {}
     for k, key in enumerate(keys):
         batches.setdefault(key, []).append(k)
@@ -40,16 +38,19 @@ def clique_tables(tree: Tree, cardinality: Int32, cells: Sequence[Cells]) -> Ite
         members = batches[key]
         if k == members[0]:
             b = int(batch[k])
-            parts = [Placed(*(f[starts[b] : starts[b + 1]] for f in fields)) for fields, starts in placed]
+            parts = [_pick(here, starts[b], starts[b + 1]) for here, starts in placed]
             done.update(zip(members, fill(len(members), key[0], parts), strict=True))
         yield done.pop(k)
 
 
-_Fields = tuple[Int64, Int64, Int64, Float]
+def _pick(cells: Placed, begin: int, end: int) -> Placed:
+    """Some of the cells."""
+    rows = slice(begin, end)
+    return Placed(cells.table[rows], cells.axis[rows], cells.value[rows], cells.amount[rows])
 
 
-def _place(tree: Tree, cells: Sequence[Cells]) -> list[_Fields]:
-    """Clique, axes, values and amount of each cell."""
+def _place(tree: Tree, cells: Sequence[Cells]) -> list[Placed]:
+    """The cells, each in its clique."""
     n = len(tree.position)
     clique = np.empty(n, np.int64)
     for k, (scope, count) in enumerate(zip(tree.scopes, tree.n_eliminated, strict=True)):
@@ -61,16 +62,16 @@ def _place(tree: Tree, cells: Sequence[Cells]) -> list[_Fields]:
         first = np.take_along_axis(c.scope, tree.position[c.scope].argmin(axis=1)[:, None], axis=1)[:, 0]
         home = clique[first]
         axis = axes[np.searchsorted(names, home[:, None] * n + c.scope)]
-        placed.append((home, axis, c.value.astype(np.int64), c.amount))
+        placed.append(Placed(home, axis, c.value.astype(np.int64), c.amount))
     return placed
 
 
-def _sorted_by_batch(fields: _Fields, batch: Int64, index: Int64, n_batches: int) -> tuple[_Fields, Int64]:
+def _sorted_by_batch(cells: Placed, batch: Int64, index: Int64, n_batches: int) -> tuple[Placed, list[int]]:
     """Cells sorted by batch, their clique replaced by its index in there, and where each batch starts."""
-    home = fields[0]
-    order = np.argsort(batch[home], kind="stable")
-    starts = np.searchsorted(batch[home][order], np.arange(n_batches + 1))
-    return (index[home][order], *(f[order] for f in fields[1:])), starts  # type: ignore[return-value]
+    order = np.argsort(batch[cells.table], kind="stable")
+    home = cells.table[order]
+    starts = np.searchsorted(batch[home], np.arange(n_batches + 1)).tolist()
+    return Placed(index[home], cells.axis[order], cells.value[order], cells.amount[order]), starts
 
 
 def _sender_shapes(tree: Tree, cardinality: Int32) -> list[tuple[int, ...]]:

@@ -132,7 +132,7 @@ def _base_values(sizes: Int64, cells: Sequence[Placed]) -> Int64:
         asked += np.bincount((c.axis * widest + c.value).ravel(), minlength=len(asked))
     table = asked.reshape(len(sizes), widest)
     table[np.arange(widest) >= sizes[:, None]] = np.inf
-    return table.argmin(axis=1)
+    return np.asarray(table.argmin(axis=1))
 
 
 def _entries(cells: Placed, sizes: Int64, stride: Int64, base: Int64) -> tuple[Int64, Float]:

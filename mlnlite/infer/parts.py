@@ -57,7 +57,7 @@ class Division:
     Attributes:
         potentials: of which.
         label: shape (n_variables,), the component of each variable.
-        rank: shape (n_components,), place of each component where those of equal shape stand together, small ones first.
+        rank: shape (n_components,), place of each component, those of equal shape together, small ones first.
         shapes: for each rank the sorted cardinalities of a small component, None for a large one.
         members: variables in order of rank; those of one component by cardinality if it is small, else rising.
         starts: shape (n_components + 1,), where each rank starts in `members`.

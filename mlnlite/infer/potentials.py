@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlnlite.errors import QueryMistake
-from mlnlite.ground.network import Bool, Clauses, Float, Int32, Network, Tables
+from mlnlite.ground.network import Bool, Clauses, Float, Int32, Int64, Network, Tables
 from mlnlite.infer.conjunctions import Cells, Conjunctions, cells_of, split_wide
 
 
@@ -51,7 +51,7 @@ def potentials_of(network: Network, extra: Sequence[Conjunctions] = (), auxiliar
     for row in rows:
         parts, cardinality = split_wide(row, cardinality)
         narrow += parts
-    cells = []
+    cells: list[Cells] = []
     for row in narrow:
         add_cells, gain = cells_of(row, cardinality)
         cells, constant = [*cells, *add_cells], constant + gain
@@ -72,13 +72,19 @@ def check_weights(network: Network) -> None:
 
 def decided_log_weight(network: Network) -> float:
     """Log-weight of the groundings that evidence decides; minus infinity if it makes one of a hard formula false."""
-    hard = np.isposinf(network.weights)
-    open_count = np.zeros(len(network.weights), np.int64)
-    for block in (*network.clauses, *network.tables):
-        np.add.at(open_count, block.weight, block.count)
-    if np.any(hard & (network.decided_true + open_count < network.n_groundings)):
+    if len(decided_false(network)):
         return -np.inf
-    return float(np.sum(np.where(hard, 0.0, network.weights) * network.decided_true))
+    soft = np.where(np.isposinf(network.weights), 0.0, network.weights)
+    return float(np.sum(soft * network.decided_true))
+
+
+def decided_false(network: Network) -> Int64:
+    """Indices of the hard weights of which evidence makes a grounding false."""
+    possible = network.decided_true.copy()
+    blocks: tuple[Clauses | Tables, ...] = (*network.clauses, *network.tables)
+    for block in blocks:
+        np.add.at(possible, block.weight, block.count)
+    return np.flatnonzero(np.isposinf(network.weights) & (possible < network.n_groundings))
 
 
 def _by_arity(cells: Sequence[Cells]) -> tuple[Cells, ...]:

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from threading import Timer
 from typing import IO
@@ -21,7 +22,7 @@ from typing import IO
 import numpy as np
 
 from mlnlite.errors import MissingPart
-from mlnlite.ground.network import Float, Int32, Int64
+from mlnlite.ground.network import Float, Int64
 from mlnlite.infer.conjunctions import Cells
 from mlnlite.infer.parts import Part
 
@@ -107,12 +108,12 @@ def _answer(line: str, scale: float, rounding: float) -> WcspAnswer:
     reply = json.loads(line) if line else {"state": None, "bound": None, "optimal": False}
     world = None if reply["state"] is None else np.array(reply["state"], np.int64)
     bound = np.inf if reply["bound"] is None else -reply["bound"] / scale + rounding
-    return WcspAnswer(world, bound, reply["optimal"], rounding)
+    return WcspAnswer(world, bound, bool(reply["optimal"]), rounding)
 
 
 def _problem(part: Part) -> tuple[dict[str, object], float, float]:
     """A component as the worker reads it, the scale of its costs, and the largest error that rounding makes."""
-    merged = [_merged(c, part.cardinality) for c in part.cells]
+    merged = [_merged(c) for c in part.cells]
     amounts = np.concatenate([m.amount[np.isfinite(m.amount)] for m in merged] or [np.zeros(0)])
     digits = min(_FINEST, int(np.floor(np.log10(_LARGEST_COST / max(1.0, float(np.abs(amounts).sum()))))))
     scale = 10.0**digits
@@ -122,7 +123,7 @@ def _problem(part: Part) -> tuple[dict[str, object], float, float]:
         edges = np.flatnonzero(np.any(np.diff(m.scope, axis=0) != 0, axis=1)) + 1
         starts = [0, *edges.tolist(), len(m.scope)]
         scopes, values = m.scope.tolist(), m.value.tolist()
-        for begin, end in zip(starts[:-1], starts[1:], strict=True):
+        for begin, end in pairwise(starts):
             functions.append([scopes[begin], 0, values[begin:end], costs[begin:end]])
     problem: dict[str, object] = {"cardinality": part.cardinality.tolist(), "functions": functions}
     return problem, scale, 0.5 * len(amounts) / scale
@@ -135,7 +136,7 @@ def _costs(amount: Float, scale: float) -> list[int | None]:
     return [cost if ok else None for cost, ok in zip(rounded, finite.tolist(), strict=True)]
 
 
-def _merged(cells: Cells, cardinality: Int32) -> Cells:
+def _merged(cells: Cells) -> Cells:
     """Equal cells added up, cells of equal scope next to each other."""
     k = cells.scope.shape[1]
     both, inverse = np.unique(np.hstack([cells.scope, cells.value]), axis=0, return_inverse=True)

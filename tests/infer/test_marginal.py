@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from mlnlite.errors import Contradiction, LimitReached
+from mlnlite.errors import Contradiction
 from mlnlite.infer import marginal, parts
 from mlnlite.infer.marginal import marginals_of
-from tests.networks import network, networks, world_weight, worlds
+from tests.networks import networks, world_weight, worlds
 
 
 def enumerate_worlds(net):

@@ -1,0 +1,344 @@
+"""Answers: comes in what inference found, with atoms as text; goes out a table, HTML, JSON, a data frame, a mapping."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.errors import MissingPart, QueryMistake, did_you_mean
+
+if TYPE_CHECKING:
+    import pandas as pd  # type: ignore[import-untyped]
+
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+Int64 = NDArray[np.int64]
+
+_SHOWN = 60
+
+
+class UnknownRowError(QueryMistake, KeyError):
+    """A result was asked for an atom or formula that it does not hold."""
+
+    __str__ = Exception.__str__
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """What an answer took.
+
+    Attributes:
+        n_atoms: unknown atoms of the network.
+        n_factors: ground formulas that evidence left open, equal ones once.
+        n_components: parts of the network that have nothing to do with each other.
+        largest_table: number of entries of the largest table.
+        seconds: [s] wall time of each stage, in order.
+    """
+
+    n_atoms: int = 0
+    n_factors: int = 0
+    n_components: int = 0
+    largest_table: int = 0
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """One line."""
+        sizes = f"{self.n_atoms:,} unknown atoms, {self.n_factors:,} factors, {self.n_components:,} components"
+        table = f", largest table {self.largest_table:,}" if self.largest_table else ""
+        times = "".join(f"; {stage} {seconds:.3f} s" for stage, seconds in self.seconds.items())
+        return sizes + table + times
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain data."""
+        names = ("n_atoms", "n_factors", "n_components", "largest_table")
+        return {**{n: int(getattr(self, n)) for n in names}, "seconds": dict(self.seconds)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marginals(Mapping[str, float]):
+    """Probabilities of atoms and formulas; a mapping from their text to their probability.
+
+    Attributes:
+        names: text of each atom or formula.
+        probabilities: shape (n,).
+        methods: how each was found: "evidence", "closed form", "elimination", ...
+        exact: shape (n,), whether the probability is exact to machine precision.
+        error: shape (n,), standard error of each, 0 where exact.
+        status: "exact", or what else can be said of the whole.
+        log_z: log partition function, nan if it is not known.
+        statistics: what it took.
+        block: shape (n,), number of the functional block of each atom, -1 for none.
+    """
+
+    names: tuple[str, ...]
+    probabilities: Float
+    methods: tuple[str, ...]
+    exact: Bool
+    error: Float
+    status: str = "exact"
+    log_z: float = float("nan")
+    statistics: Statistics = Statistics()
+    block: Int64 | None = None
+    _index: dict[str, int] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Prepares look-up by text."""
+        object.__setattr__(self, "_index", _index_of(self.names))
+
+    def __getitem__(self, name: str) -> float:
+        """Probability of an atom or formula, by its text; spaces do not matter."""
+        return float(self.probabilities[_find(self._index, self.names, name)])
+
+    def __iter__(self) -> Iterator[str]:
+        """The texts."""
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.names)
+
+    def __str__(self) -> str:
+        """A table, of the first rows if there are many."""
+        return self.to_text(_SHOWN)
+
+    def to_text(self, limit: int | None = None) -> str:
+        """A table, predicate by predicate and block by block.
+
+        Args:
+            limit: show at most so many rows.
+        """
+        summary = [f"status: {self.status}"] + ([f"log Z = {self.log_z:.6f}"] if isfinite(self.log_z) else [])
+        return _text(_HEAD, self._rows(), limit, [", ".join(summary), str(self.statistics)])
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        """Cells of the table."""
+        order = _order(self.names, self.block)
+        bars = [f" +- {e:.4f}" if e > 0 else "" for e in self.error.tolist()]
+        return [(self.names[i], f"{self.probabilities[i]:.4f}{bars[i]}", self.methods[i]) for i in order]
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks."""
+        return _html(_HEAD, self._rows(), f"status: {self.status}")
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain data."""
+        keys = ("name", "probability", "method", "exact", "error")
+        columns = (self.names, self.probabilities.tolist(), self.methods, self.exact.tolist(), self.error.tolist())
+        return {
+            "status": self.status,
+            "log_z": _number(self.log_z),
+            "marginals": [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)],
+            "statistics": self.statistics.to_dict(),
+        }
+
+    def to_json(self, indent: int | None = 2) -> str:
+        """JSON text."""
+        return json.dumps(self.to_dict(), indent=indent)
+
+    def to_frame(self) -> pd.DataFrame:
+        """A pandas data frame, one row for each atom or formula.
+
+        Raises:
+            MissingPart: pandas is not installed.
+        """
+        columns = {"name": self.names, "probability": self.probabilities, "method": self.methods}
+        return _frame({**columns, "exact": self.exact, "error": self.error})
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """A soft formula that a world pays for.
+
+    Attributes:
+        formula: its text.
+        n_groundings: how many groundings are false, or true if the weight is negative.
+        weight: its log weight.
+    """
+
+    formula: str
+    n_groundings: int
+    weight: float
+
+    @property
+    def cost(self) -> float:
+        """Log-weight that the world loses."""
+        return abs(self.weight) * self.n_groundings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapState(Mapping[str, bool]):
+    """A most probable world, or the best that was found; a mapping from atoms to their truth.
+
+    Attributes:
+        names: text of each atom.
+        truth: shape (n,).
+        methods: how each was found.
+        log_weight: of the world.
+        bound: no world has a larger log-weight.
+        status: "optimal", or "feasible" if a better world may exist.
+        violated: the soft formulas that the world pays for.
+        statistics: what it took.
+        block: shape (n,), number of the functional block of each atom, -1 for none.
+    """
+
+    names: tuple[str, ...]
+    truth: Bool
+    methods: tuple[str, ...]
+    log_weight: float
+    bound: float
+    status: str
+    violated: tuple[Violation, ...] = ()
+    statistics: Statistics = Statistics()
+    block: Int64 | None = None
+    _index: dict[str, int] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Prepares look-up by text."""
+        object.__setattr__(self, "_index", _index_of(self.names))
+
+    @property
+    def gap(self) -> float:
+        """How much larger the log-weight of another world could at most be."""
+        return self.bound - self.log_weight
+
+    @property
+    def state(self) -> dict[str, bool]:
+        """Truth of each atom."""
+        return dict(zip(self.names, self.truth.tolist(), strict=True))
+
+    @property
+    def true_atoms(self) -> tuple[str, ...]:
+        """The atoms that are true."""
+        return tuple(self.names[i] for i in np.flatnonzero(self.truth).tolist())
+
+    def __getitem__(self, name: str) -> bool:
+        """Truth of an atom, by its text; spaces do not matter."""
+        return bool(self.truth[_find(self._index, self.names, name)])
+
+    def __iter__(self) -> Iterator[str]:
+        """The atoms."""
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        """How many atoms."""
+        return len(self.names)
+
+    def __str__(self) -> str:
+        """The true atoms and what they cost, of the first rows if there are many."""
+        return self.to_text(_SHOWN)
+
+    def to_text(self, limit: int | None = None) -> str:
+        """The true atoms, then the formulas that they violate.
+
+        Args:
+            limit: show at most so many rows.
+        """
+        worst = sorted(self.violated, key=lambda v: -v.cost)[: limit or None]
+        paid = [f"pays {v.cost:.4g} for {v.formula} ({v.n_groundings:,} x {v.weight:.4g})" for v in worst]
+        rest = len(self.violated) - len(worst)
+        paid += [f"pays for {rest:,} more formulas"] if rest else []
+        summary = f"status: {self.status}, log-weight {self.log_weight:.6f}, bound {self.bound:.6f}, gap {self.gap:.3g}"
+        return _text(("true atom", "method"), self._rows(), limit, [*paid, summary, str(self.statistics)])
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        """Cells of the table."""
+        return [(self.names[i], self.methods[i]) for i in _order(self.names, self.block) if self.truth[i]]
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks."""
+        caption = f"status: {self.status}, log-weight {self.log_weight:.4f}, gap {self.gap:.3g}"
+        return _html(("true atom", "method"), self._rows(), caption)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain data."""
+        paid = [{"formula": v.formula, "n_groundings": v.n_groundings, "weight": v.weight} for v in self.violated]
+        return {
+            "status": self.status,
+            "log_weight": _number(self.log_weight),
+            "bound": _number(self.bound),
+            "gap": _number(self.gap),
+            "true_atoms": list(self.true_atoms),
+            "state": self.state,
+            "violated": paid,
+            "statistics": self.statistics.to_dict(),
+        }
+
+    def to_json(self, indent: int | None = 2) -> str:
+        """JSON text."""
+        return json.dumps(self.to_dict(), indent=indent)
+
+    def to_frame(self) -> pd.DataFrame:
+        """A pandas data frame, one row for each atom.
+
+        Raises:
+            MissingPart: pandas is not installed.
+        """
+        return _frame({"name": self.names, "truth": self.truth, "method": self.methods})
+
+
+_HEAD = ("atom or formula", "probability", "method")
+
+
+def _number(value: float) -> float | None:
+    """A number as JSON knows it."""
+    return value if isfinite(value) else None
+
+
+def _index_of(names: Sequence[str]) -> dict[str, int]:
+    """Row of each text, with and without its spaces; a text itself goes before what another one is without spaces."""
+    squeezed = {"".join(name.split()): i for i, name in enumerate(names)}
+    return squeezed | {name: i for i, name in enumerate(names)}
+
+
+def _find(index: Mapping[str, int], names: Sequence[str], name: str) -> int:
+    """Row of a text."""
+    row = index.get(name, index.get("".join(name.split())))
+    if row is None:
+        raise UnknownRowError(f"the result holds no {name}", hint=did_you_mean(name, names))
+    return row
+
+
+def _order(names: Sequence[str], block: Int64 | None) -> list[int]:
+    """Rows predicate by predicate, block by block, otherwise as given."""
+    predicates: dict[str, int] = {}
+    for name in names:
+        predicates.setdefault(name.partition("(")[0], len(predicates))
+    blocks: dict[int, int] = {}
+    first = [i if b < 0 else blocks.setdefault(b, i) for i, b in enumerate([] if block is None else block.tolist())]
+    place = first or range(len(names))
+    return sorted(range(len(names)), key=lambda i: (predicates[names[i].partition("(")[0]], place[i], i))
+
+
+def _text(head: tuple[str, ...], rows: list[tuple[str, ...]], limit: int | None, foot: Sequence[str]) -> str:
+    """A table in plain text."""
+    shown = [head, *(rows if limit is None else rows[:limit])]
+    widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
+    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in shown]
+    lines.insert(1, "  ".join("-" * w for w in widths))
+    left = len(rows) - len(shown) + 1
+    return "\n".join([*lines, *([f"... {left:,} more"] if left else []), *foot])
+
+
+def _html(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str) -> str:
+    """A table in HTML, its first rows if there are many."""
+    body = "".join(f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in row)}</tr>" for row in rows[:_SHOWN])
+    more = f" ({len(rows) - _SHOWN:,} more rows)" if len(rows) > _SHOWN else ""
+    top = "".join(f"<th>{escape(h)}</th>" for h in head)
+    caption = f"<caption>{escape(caption)}{more}</caption>"
+    return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _frame(columns: Mapping[str, object]) -> pd.DataFrame:
+    """A data frame of columns."""
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise MissingPart("pandas is not installed", hint="pip install pandas") from error
+    return pd.DataFrame({name: list(column) for name, column in columns.items()})  # type: ignore[call-overload]
