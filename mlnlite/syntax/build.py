@@ -9,30 +9,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from mlnlite.errors import SyntaxMistake
-from mlnlite.source import Source, Span
+from mlnlite.source import Span
 from mlnlite.syntax import tree
 from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.nesting import refuse_long_expression
+from mlnlite.syntax.place import Place
 
 # Children are finished nodes and tokens; a token is a string with a `type` and a `start_pos` in the statement.
 Children = list[Any]
 
 _VARIABLE = re.compile(r"_*[^\W\d_][\w']*|_+")
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a statement stands: at `offset` of `source`."""
-
-    source: Source
-    offset: int
-
-    def span(self, start: int, end: int) -> Span:
-        """The span of characters `start` to `end` of the statement."""
-        return Span(self.source, self.offset + start, self.offset + end)
-
-    def token(self, token: Any) -> Span:  # noqa: ANN401
-        """The span of a token."""
-        return self.span(token.start_pos, token.start_pos + len(token))
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,6 +173,7 @@ def _call(place: Place, span: Span, children: Children) -> tree.Call:
 
 
 def _weight(place: Place, span: Span, children: Children) -> Weight:
+    refuse_long_expression(children[-1])
     return Weight(children[-1], len(children) > 1, span)
 
 
@@ -202,7 +189,7 @@ def _statement(place: Place, span: Span, children: Children) -> tree.FormulaStat
         raise SyntaxMistake([mistake("E107", weight.span, hint)])
     if weight and not place.source.text[weight.span.end].isspace():
         hint = f"put a space after it: `{weight.span.text} {_begin(place.source.text[weight.span.end : span.end])}`"
-        raise SyntaxMistake([mistake("E108", weight.span, hint, weight=weight.span.text)])
+        raise SyntaxMistake([mistake("E108", weight.span, hint, number=weight.span.text)])
     if weight is None:
         return tree.FormulaStatement(formula, None, hard, span=span)
     return tree.FormulaStatement(formula, weight.value, False, weight.fixed, span=span)
@@ -226,8 +213,15 @@ def _type_declaration(place: Place, span: Span, children: Children) -> tree.Type
     return tree.TypeDeclaration(str(children[0]), tuple(_nodes(children)), span)
 
 
+def _start(token: Any) -> int:  # noqa: ANN401
+    return int(token.start_pos)
+
+
 def _fact(place: Place, span: Span, children: Children) -> Fact:
     types = [getattr(child, "type", "") for child in children]
+    if types[0] == "NUMBER" and place.token(children[0]).end == place.offset + _start(children[1]):
+        hint = f"put a space after it: `{children[0]} {_begin(span.text[len(children[0]) :])}`"
+        raise SyntaxMistake([mistake("E108", place.token(children[0]), hint, number=children[0])])
     truth = float(children[0]) if types[0] == "NUMBER" else None
     arguments = tuple(constant.name for constant in _nodes(children))
     return Fact(str(children[types.index("NAME")]), arguments, "NOT" not in types, truth, span)

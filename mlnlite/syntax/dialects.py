@@ -15,7 +15,7 @@ from mlnlite.syntax.walk import constants_of, variables_of
 
 _MARKED = re.compile(r"\?\w[\w']*")
 # What a variable of the standard dialect usually looks like.
-_LOOKS_VARIABLE = re.compile(r"[a-z]\d{0,2}'?")
+LOOKS_VARIABLE = re.compile(r"[a-z]\d{0,2}'?")
 _QUOTE_HINT = 'write `?{0}` if it is a variable, or "{0}" in quotes if it is a constant'
 
 
@@ -30,7 +30,7 @@ def first_marked(codes: Iterable[Code]) -> Span | None:
 
 def wrong_dialect(marked: Span) -> Diagnostic:
     """The mistake of reading prac text as standard."""
-    words = {"actual": "prac", "asked": "standard", "found": marked.text, "meaning": "is a variable only in the prac dialect"}
+    words = {"actual": "prac", "asked": "standard", "found": marked.text, "meaning": "is a variable of the former only"}
     return mistake("E118", marked, "choose the dialect `prac`, or let it be found out", **words)
 
 
@@ -59,10 +59,10 @@ def group_mistakes(group: Group, marked: Span | None) -> Iterator[Diagnostic]:
 
 
 def _suspicious(formula: tree.Formula, constants: Sequence[str]) -> list[str]:
-    """At most one constant: it has the name of a variable of the formula, or there is no variable and it looks like one."""
+    """At most one constant: one named like a variable of the formula or, if that has none, one that looks like one."""
     variables = {variable.name for variable in variables_of(formula)}
     for name in constants:
-        if name in variables or (not variables and _LOOKS_VARIABLE.fullmatch(name)):
+        if name in variables or (not variables and LOOKS_VARIABLE.fullmatch(name)):
             return [name]
     return []
 

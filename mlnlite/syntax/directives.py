@@ -6,9 +6,10 @@ import re
 from dataclasses import dataclass, replace
 
 from mlnlite.errors import Diagnostic, SyntaxMistake, did_you_mean
-from mlnlite.source import Source, Span
+from mlnlite.source import Span
 from mlnlite.syntax import tree
 from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.place import Place
 
 _KNOWN = ("#unique", "#fixweight", "#include", "#group", "#fuzzy")
 _WORD = re.compile(r"#[\w-]*")
@@ -46,25 +47,26 @@ def _word(text: str) -> str:
     return match[0] if match else text
 
 
-def read_directive(text: str, source: Source, start: int, pending: Pending) -> Pending:
-    """What is pending after the directive `text`, which stands at offset `start`.
+def read_directive(text: str, place: Place, pending: Pending) -> Pending:
+    """What is pending after the directive `text`, which stands at `place`.
 
     Raises:
         SyntaxMistake: unknown, malformed or not supported.
     """
-    word, span = _word(text), Span(source, start, start + len(text))
-    place = Span(source, start, start + len(word))
+    word, span = _word(text), place.span(0, len(text))
+    mark = place.span(0, len(word))
     match word:
         case "#unique":
             found = _UNIQUE.fullmatch(text)
             if found is None:
-                raise _malformed(span, word, "has to name variables with `+`", "write `#unique{+a,+b}`, in prac `#unique{+?a,+?b}`")
+                hint = "write `#unique{+a,+b}`, in the prac dialect `#unique{+?a,+?b}`"
+                raise _malformed(span, word, "has to name variables with `+`", hint)
             names = tuple(name.strip().lstrip("+").lstrip("?") for name in found[1].split(","))
-            return replace(pending, directives=(*pending.directives, place), unique=(*pending.unique, names))
+            return replace(pending, directives=(*pending.directives, mark), unique=(*pending.unique, names))
         case "#fixweight":
             if text != word:
                 raise _malformed(span, word, "stands alone on its line", "put the formula on the next line")
-            return replace(pending, directives=(*pending.directives, place), fixed=True)
+            return replace(pending, directives=(*pending.directives, mark), fixed=True)
         case "#include":
             if not re.fullmatch(r'#include\s*(?:"[^"]+"|<[^>]+>)', text):
                 raise _malformed(span, word, "needs the name of a file", 'write `#include "file.mln"`')
@@ -72,12 +74,12 @@ def read_directive(text: str, source: Source, start: int, pending: Pending) -> P
         case "#group":
             return pending
         case "#fuzzy":
-            hint = "graded truth is not supported: a fact is true or false; remove the line to read the predicate that way"
-            raise SyntaxMistake([mistake("E110", place, hint, construct="`#fuzzy` (a predicate with graded truth)")])
+            hint = "graded truth is not supported: remove the line, and each atom is either true or false"
+            raise SyntaxMistake([mistake("E110", mark, hint, construct="`#fuzzy` (a predicate with graded truth)")])
     if text[1:2].isspace() or text == "#":
-        raise SyntaxMistake([mistake("E111", place, "a comment starts with `//`", found=word)])
+        raise SyntaxMistake([mistake("E111", mark, "a comment starts with `//`", found=word)])
     hint = did_you_mean(word, _KNOWN) or f"known are {', '.join(_KNOWN[:-1])}; a comment starts with `//`"
-    raise SyntaxMistake([mistake("E111", place, hint, found=word)])
+    raise SyntaxMistake([mistake("E111", mark, hint, found=word)])
 
 
 def _malformed(span: Span, word: str, problem: str, hint: str) -> SyntaxMistake:

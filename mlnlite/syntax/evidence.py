@@ -13,9 +13,11 @@ from mlnlite.syntax.grammar import parse_node
 from mlnlite.syntax.includes import ANY_INCLUDE, File, load
 from mlnlite.syntax.lines import split_statements
 from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.place import Place
 from mlnlite.syntax.tree import Dialect, EvidenceProgram, FactTable, TypeDeclaration
 
 MAX_MISTAKES = 100
+_MANY = 20_000
 # A fact on a line of its own whose constants are plain words: a subset of what the grammar accepts.
 _WORD = r" *+-?\w++(?:[-.]\w++)*+ *+"
 _FACT = re.compile(rf"^[ \t]*+(!?)([^\W\d]\w*+)\(({_WORD}(?:,{_WORD})*+)\)[ \t\r]*+$", re.MULTILINE)
@@ -24,7 +26,7 @@ _TYPE = re.compile(r"[^\W\d][\w'-]*\s*=\s*\{")
 
 @dataclass(slots=True)
 class _Rows:
-    """A fact table that grows; the arguments of facts read by the pattern stay together, uncut, until many are there."""
+    """A fact table that grows. Arguments of facts read by the pattern stay together, uncut, until there are many."""
 
     columns: tuple[list[str], ...]
     truth: list[bool] = field(default_factory=list)
@@ -59,8 +61,8 @@ class _Reading:
 def parse_evidence(source: Source, dialect: Dialect) -> EvidenceProgram:
     """The facts of an evidence file; every argument is a constant in both dialects.
 
-    `---` alone on a line starts the next database. Facts of an included file belong to the database of the `#include`; as their
-    place counts that of the `#include`.
+    `---` alone on a line starts the next database. Facts of an included file belong to the database of the `#include`,
+    and their place is that of the `#include`.
 
     Args:
         source: the file.
@@ -99,6 +101,8 @@ def _read_file(file: File, dialect: Dialect, reading: _Reading) -> None:
         done = match.end()
         rows = _rows(reading, predicate, arguments.count(",") + 1)
         rows.uncut.append(arguments)
+        if len(rows.uncut) >= _MANY:
+            _cut(rows, reading.constants)
         rows.truth.append(not sign)
         rows.database.append(reading.database)
         rows.offset.append(start if included_at is None else included_at)
@@ -156,9 +160,9 @@ def _read_statement(file: File, start: int, end: int, dialect: Dialect, reading:
     elif text.startswith("---"):
         raise SyntaxMistake([mistake("E147", Span(source, start, end), "put `---` alone on its line", found=text)])
     elif _TYPE.match(text):
-        reading.types.append(parse_node("type_declaration", text, source, start, dialect, evidence=True))
+        reading.types.append(parse_node("type_declaration", text, Place(source, start), "evidence"))
     else:
-        fact: Fact = parse_node("fact", text, source, start, dialect, evidence=True)
+        fact: Fact = parse_node("fact", text, Place(source, start), "evidence")
         _add(reading, fact, fact.positive == _truth(fact), start)
 
 
@@ -171,7 +175,8 @@ def _truth(fact: Fact) -> bool:
     if 0.0 < fact.truth < 1.0:
         hint = "decide whether it is true, or leave it out; a belief can be put into the model as a weighted formula"
         raise SyntaxMistake([mistake("E144", fact.span, hint, found=f"{fact.truth:g}")])
-    raise SyntaxMistake([mistake("E148", fact.span, "weights belong to the formulas of the model", found=f"{fact.truth:g}")])
+    hint = "weights belong to the formulas of the model; write the fact without a number"
+    raise SyntaxMistake([mistake("E148", fact.span, hint, found=f"{fact.truth:g}")])
 
 
 def _read_include(file: File, start: int, end: int, dialect: Dialect, reading: _Reading) -> None:

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 
 from mlnlite.errors import Diagnostic
 from mlnlite.source import Span
-from mlnlite.syntax.build import Place
 from mlnlite.syntax.foreign import CONSTRUCTS, foreign_operator
 from mlnlite.syntax.messages import mistake
-from mlnlite.syntax.tree import Dialect
+from mlnlite.syntax.place import Language, Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +23,7 @@ class Failure:
         text: the statement.
         at: offset in it of what did not fit.
         expected: names of the terminals that would have fitted.
-        dialect: the dialect it was read in.
+        language: the language it was read in.
         rule: the rule it was read by.
     """
 
@@ -32,7 +31,7 @@ class Failure:
     text: str
     at: int
     expected: frozenset[str]
-    dialect: Dialect
+    language: Language
     rule: str
 
     def span(self, start: int, end: int) -> Span:
@@ -59,21 +58,17 @@ class Failure:
 _FOUND = re.compile(r'<=>|=>|=/=|!=|---+|->|\?[\w\']+|-?\w[\w\']*(?:[-.:]\w+)*|"(?:[^"\\\n]|\\[^\n])*"|\S')
 _FORMULA = {"NAME", "NOT", "QUANTIFIER"}
 _TERM = {"WORD", "STRING"}
+_CONNECTIVES = {"AND": "`^`", "OR": "`v`", "IMPLIES": "`=>`", "IFF": "`<=>`"}
 _WORDS = {
+    "NUMBER": "a number",
+    "COMMA": "`,`",
     "LPAR": "`(`",
     "RPAR": "`)`",
     "LBRACE": "`{`",
     "RBRACE": "`}`",
-    "COMMA": "`,`",
-    "EQUAL": "`=`",
-    "QUESTION": "`?`",
     "NOT": "`!`",
-    "NUMBER": "a number",
-    "AND": "`^`",
-    "OR": "`v`",
-    "IMPLIES": "`=>`",
-    "IFF": "`<=>`",
-    "$END": "the end of the statement",
+    "QUESTION": "`?`",
+    "EQUAL": "`=`",
 }
 
 
@@ -87,22 +82,28 @@ def explain(failure: Failure) -> Diagnostic:
 
 
 def expectation(failure: Failure) -> str:
-    """What would have fitted: at most four things, the likeliest first.
-
-    Terms, formulas and connectives are named as such.
-    """
-    left, said = set(failure.expected), []
-    if _FORMULA <= left:
-        said.append("a formula")
-        left = left & {"RPAR", "COMMA"}
-    if left & _TERM or left == {"VARIABLE"}:
-        said.append(_term_words(failure))
-        left -= _TERM | {"VARIABLE", "PLUS"}
-    order = ["COMMA", "RPAR", "LPAR", "LBRACE", "RBRACE", "NOT", "QUESTION", "NUMBER", "AND", "OR", "IMPLIES", "IFF", "$END", "EQUAL"]
-    if "NAME" in left:
-        said.append("a type" if failure.rule == "declaration" and left == {"NAME"} else "a name")
-    said += [_WORDS[name] for name in order if name in left]
+    """What would have fitted, the likeliest first: terms, formulas and connectives by these names, signs as they are."""
+    names = failure.expected
+    if names >= _FORMULA and failure.language != "evidence":
+        names = names & {"RPAR", "COMMA"}
+        said = ["a formula"]
+    elif names & _TERM or names == {"VARIABLE"}:
+        names = names - _TERM - {"PLUS"}
+        said = [_term_words(failure)]
+    else:
+        said = [_name_word(failure)] if "NAME" in names else []
+        names = names - {"NOT", "NUMBER"} if said == ["a fact"] else names
+    connectives = [sign for name, sign in _CONNECTIVES.items() if name in names]
+    said += [sign for name, sign in _WORDS.items() if name in names and (name != "EQUAL" or not connectives)]
+    said += [f"a connective ({', '.join(connectives)})"] if connectives else []
+    said += ["the end of the statement"] if "$END" in names else []
     return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} or {said[-1]}"
+
+
+def _name_word(failure: Failure) -> str:
+    if failure.rule == "fact":
+        return "a fact" if failure.at == 0 else "a predicate"
+    return "a type" if "(" in failure.text[: failure.at] else "a predicate"
 
 
 def _term_words(failure: Failure) -> str:
@@ -110,10 +111,19 @@ def _term_words(failure: Failure) -> str:
         return "a constant"
     if failure.expected & _TERM:
         return "a variable or a constant"
-    return "a variable such as `?x`" if failure.dialect == "prac" else "a variable"
+    return "a variable such as `?x`"
 
 
 # --- rules, tried in this order
+
+
+def _quantifier(failure: Failure) -> Diagnostic | None:
+    match = re.search(r"\b(exists?|forall)\s*(?=\()", failure.text, re.IGNORECASE)
+    if match is None or failure.at < match.end() or failure.rule == "fact":
+        return None
+    variable = "?x" if failure.language == "prac" else "x"
+    hint = f"write `{match[1].upper()} {variable} (...)`"
+    return mistake("E127", failure.span(match.start(), match.end(1)), hint, quantifier=match[1])
 
 
 def _foreign(failure: Failure) -> Diagnostic | None:
@@ -126,18 +136,21 @@ def _foreign(failure: Failure) -> Diagnostic | None:
 
 def _construct(failure: Failure) -> Diagnostic | None:
     for pattern, name, advice in CONSTRUCTS:
+        if failure.language == "evidence" and name.endswith("formula"):
+            continue
         for match in pattern.finditer(failure.text):
-            if match.start() <= failure.at <= match.end():
+            if match.start() <= failure.at < match.end():
                 return mistake("E110", failure.span(match.start(), match.end()), advice, construct=name)
     return None
 
 
 def _quote(failure: Failure) -> Diagnostic | None:
     character = failure.text[failure.at : failure.at + 1]
-    if character == '"' and not failure.found_text[1:].endswith('"'):
+    if character == '"' and failure.found_text == '"':
         return mistake("E114", failure.found_span, 'write `"` where the text ends, on the same line')
-    if character in "'`‘“" and character:
-        return mistake("E115", failure.found_span, 'text with spaces goes in double quotes: "any text"', found=failure.found)
+    if character and character in "'`\u2018\u201c":
+        hint = 'a constant with a space in it goes in straight double quotes: "any text"'
+        return mistake("E128", failure.found_span, hint, found=f"`{character}`")
     return None
 
 
@@ -156,7 +169,9 @@ def _variable_mark(failure: Failure) -> Diagnostic | None:
         return None
     if failure.rule == "fact":
         return _unknown_fact(failure)
-    if failure.dialect == "standard" and failure.expected & (_TERM | {"NAME"}):
+    if failure.found_text == "?":
+        return None
+    if failure.language == "standard" and failure.expected & (_TERM | {"NAME"}):
         meaning = "starts with `?`, which is no variable there"
         hint = "choose the dialect `prac`, or write variables in lower case without `?`"
         words = {"actual": "prac", "asked": "standard", "found": failure.found_text, "meaning": meaning}
@@ -173,7 +188,7 @@ def _unknown_fact(failure: Failure) -> Diagnostic:
 
 def _chain(failure: Failure) -> Diagnostic | None:
     operator = failure.found_text
-    if operator not in ("=>", "<=>") or "$END" not in failure.expected | {"RPAR"} & failure.expected and "RPAR" not in failure.expected:
+    if operator not in ("=>", "<=>") or not failure.expected & {"$END", "RPAR"}:
         return None
     hint = f"write `a {operator} (b {operator} c)` or `(a {operator} b) {operator} c`"
     return mistake("E106", failure.found_span, hint, operator=operator)
@@ -209,6 +224,20 @@ def _unknown_function(failure: Failure) -> Diagnostic | None:
     return mistake("E122", failure.span(call.start(1), call.end(1)), hint, found=call[1])
 
 
+def _no_truth(failure: Failure) -> Diagnostic | None:
+    number = re.match(r"[-+]\s*[\d.]+", failure.text)
+    if failure.rule != "fact" or number is None or failure.at > 0:
+        return None
+    hint = "weights belong to the formulas of the model; that a fact is false is written `!`"
+    return mistake("E148", failure.span(0, number.end()), hint, found=number[0])
+
+
+def _separator(failure: Failure) -> Diagnostic | None:
+    if failure.rule != "fact" or not failure.found_text.startswith("---"):
+        return None
+    return mistake("E147", failure.found_span, "put `---` alone on its line", found=failure.text)
+
+
 def _final_dot(failure: Failure) -> Diagnostic | None:
     if failure.rule == "fact" and failure.found_text == "." and "$END" in failure.expected:
         return mistake("E143", failure.found_span, "drop the dot: a fact is certain anyway")
@@ -216,11 +245,12 @@ def _final_dot(failure: Failure) -> Diagnostic | None:
 
 
 def _second_statement(failure: Failure) -> Diagnostic | None:
-    rest = re.match(r"[!*@]?-?[\w.]", failure.text[failure.at :])
+    rest = re.match(r"[,;]?\s*[!*@]?-?[\w.]", failure.text[failure.at :])
     if "$END" not in failure.expected or rest is None:
         return None
     if failure.rule == "fact":
-        return mistake("E141", failure.found_span, "write one fact a line", found=failure.found)
+        hint = "write one fact a line; a comment starts with `//`"
+        return mistake("E141", failure.found_span, hint, found=failure.found)
     after_dot = failure.text[: failure.at].rstrip().endswith(".")
     if after_dot or re.match(r"[-@.\d]", failure.found_text):
         return mistake("E109", failure.found_span, "write one statement a line", found=failure.found)
@@ -228,7 +258,9 @@ def _second_statement(failure: Failure) -> Diagnostic | None:
 
 
 def _not_a_fact(failure: Failure) -> Diagnostic | None:
-    if failure.rule == "fact" and "$END" in failure.expected and failure.found_text in ("^", "v", "=>", "<=>", "=", "!="):
+    connective = failure.found_text in ("^", "v", "=>", "<=>", "=", "!=")
+    quantified = re.match(r"(?i:exists?|forall)\s", failure.text)
+    if failure.rule == "fact" and "$END" in failure.expected and (connective or quantified):
         hint = "evidence lists single facts, one a line; formulas belong in the model"
         return mistake("E142", failure.found_span, hint, found=failure.found)
     return None
@@ -237,55 +269,69 @@ def _not_a_fact(failure: Failure) -> Diagnostic | None:
 def _too_early(failure: Failure) -> Diagnostic | None:
     if failure.found_text:
         return None
-    opened = _open_parenthesis(failure.text, failure.at)
-    if opened is None:
-        hint = "a formula goes on in the next line only after a connective or inside parentheses"
-        span = failure.span(max(0, len(failure.text.rstrip()) - 1), len(failure.text.rstrip()))
-        return mistake("E102", span, hint, expected=expectation(failure))
-    return _unclosed(failure, opened)
-
-
-def _unclosed(failure: Failure, opened: int) -> Diagnostic:
     end = len(failure.text.rstrip())
-    hint = f"the statement ends after `{failure.text[:end].split()[-1]}`"
-    words = {"found": "the statement ends", "expected": expectation(failure)}
-    return mistake("E103", failure.span(opened, opened + 1), hint, **words)
+    span, expected = failure.span(end - 1, end), expectation(failure)
+    opened = _opened(failure)
+    if opened is not None:
+        hint = f"the `{failure.text[opened]}` {_where(failure, opened)} is not closed"
+        return mistake("E103", span, hint, opened=failure.text[opened], expected=expected)
+    hint = "a formula goes on in the next line, without a blank line between" if "a formula" in expected else ""
+    return mistake("E102", span, hint, expected=expected)
 
 
 def _unexpected(failure: Failure) -> Diagnostic:
-    opened = _open_parenthesis(failure.text, failure.at)
+    opened = _opened(failure)
     hint = _hint(failure)
-    if not hint and opened is not None and "RPAR" in failure.expected:
-        hint = f"the `(` at column {failure.span(opened, opened + 1).column} is still open"
+    if not hint and opened is not None and failure.expected & {"RPAR", "RBRACE"}:
+        hint = f"the `{failure.text[opened]}` {_where(failure, opened)} is still open"
     return mistake("E101", failure.found_span, hint, found=failure.found, expected=expectation(failure))
 
 
+def _where(failure: Failure, offset: int) -> str:
+    """The place of another character of the statement; the line only if it is a different one."""
+    span = failure.span(offset, offset + 1)
+    line = "" if span.line == failure.found_span.line else f"line {span.line}, "
+    return f"at {line}column {span.column}"
+
+
 def _hint(failure: Failure) -> str:
-    before = failure.text[: failure.at].rstrip()
-    if not before and failure.found_text in ("^", "v", "=>", "<=>", ","):
-        return "to go on from the line above, put the connective at its end"
-    if failure.found_text == "," and "AND" in failure.expected:
-        return "conjunction is written `^`"
-    if failure.expected & {"COMMA"} and re.match(r"[\w\"]", failure.found_text):
-        return 'separate arguments by commas; a constant with a space in it goes in quotes: "any text"'
-    if failure.found_text.startswith("#"):
-        return "a comment starts with `//`"
-    if failure.dialect == "prac" and failure.expected == {"VARIABLE"} and failure.found_text:
-        return f"variables of the prac dialect start with `?`: `?{failure.found_text}`"
+    found, expected = failure.found_text, failure.expected
+    for applies, hint in (
+        (failure.at == 0 and found in _SIGNS, "to go on from the line above, end that line with the connective"),
+        (found == "?" and failure.language == "prac", "write the name of the variable right after its `?`"),
+        (found == "*" and failure.rule == "fact", "`*` belongs to the declaration of the predicate in the model"),
+        (found in ("=", "!=", "=/="), "`=` compares terms; that two formulas are equivalent is written `<=>`"),
+        (found == "," and failure.text.split("=")[0].strip().isidentifier(), "the constants of a type go in braces"),
+        (found == "," and "AND" in expected, "conjunction is written `^`"),
+        (found.startswith("#"), "a comment starts with `//`"),
+        (expected == {"VARIABLE"}, f"variables of the prac dialect start with `?`: `?{found}`"),
+        (expected >= {"COMMA", "RPAR"} and found[:1].isalnum(), _SEPARATE),
+        (expected >= {"COMMA", "RBRACE"} and found[:1].isalnum(), _SEPARATE),
+        (expected >= {"AND", "$END"} and found[:1].isalpha(), "put a connective between them, or write two lines"),
+        (expected >= {"NUMBER"} and found[:1].isalpha(), "a weight is made of numbers; then a space, then the formula"),
+    ):
+        if applies:
+            return hint
     return ""
 
 
-def _open_parenthesis(text: str, end: int) -> int | None:
-    opened = []
-    for match in re.finditer(r'"(?:[^"\\\n]|\\[^\n])*"|[()]', text[:end]):
-        if match[0] == "(":
+_SIGNS = ("^", "v", "=>", "<=>", ",")
+_SEPARATE = 'separate them by a comma; a constant with a space in it goes in quotes: "any text"'
+
+
+def _opened(failure: Failure) -> int | None:
+    """Offset of the innermost parenthesis or brace that is open where the failure is."""
+    opened: list[int] = []
+    for match in re.finditer(r'"(?:[^"\\\n]|\\[^\n])*"|[(){}]', failure.text[: failure.at]):
+        if match[0] in "({":
             opened.append(match.start())
-        elif match[0] == ")" and opened:
+        elif match[0] in ")}" and opened:
             opened.pop()
     return opened[-1] if opened else None
 
 
 _RULES: tuple[Callable[[Failure], Diagnostic | None], ...] = (
+    _quantifier,
     _construct,
     _foreign,
     _not_a_fact,
@@ -297,6 +343,8 @@ _RULES: tuple[Callable[[Failure], Diagnostic | None], ...] = (
     _empty_parentheses,
     _weight_alone,
     _unknown_function,
+    _no_truth,
+    _separator,
     _final_dot,
     _second_statement,
     _too_early,

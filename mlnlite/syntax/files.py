@@ -17,7 +17,7 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 def read_source(path: str | os.PathLike[str]) -> Source:
     """The text of a UTF-8 file, under the name that its path has here.
 
-    A byte-order mark at its start is dropped, line ends become `\\n`.
+    A byte-order mark at its start is dropped, and every kind of line end becomes a newline.
 
     Raises:
         SyntaxMistake: no such file, a folder, not readable, empty, too large, or not UTF-8 text.

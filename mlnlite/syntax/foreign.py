@@ -1,4 +1,5 @@
-"""What users of other languages write: their operators, with ours, and constructs of other systems that are not supported."""
+# ruff: noqa: RUF001 (signs that look like ours are the point here)
+"""What users of other languages write: their operators, with ours, and constructs of theirs that are not supported."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ _DOUBLED = {"==": "equality is written `=`", "**": "a power is written `^`"}
 
 
 def foreign_operator(text: str, at: int) -> tuple[int, int, str] | None:
-    """An operator of another language at offset `at`, or just before it: its start, its end, and what to write instead."""
+    """An operator of another language at offset `at` or just before it: its start, its end, what to write instead."""
     for pattern, advice in _OPERATORS:
         match = pattern.match(text, at)
         if match:
@@ -37,21 +38,21 @@ def foreign_operator(text: str, at: int) -> tuple[int, int, str] | None:
     return word.start(1), word.end(1), advice
 
 
-# Constructs of other systems: the failure must lie inside the match.
+# Constructs of other systems, how to call them, and what to do instead. The failure has to lie inside the match.
 CONSTRUCTS: tuple[tuple[re.Pattern[str], str, str], ...] = tuple(
     (re.compile(pattern), name, advice)
     for pattern, name, advice in (
-        (r"^\s*(?:P|R|SE)\s*\(.*\)\s*=\s*[\d.]+\s*$", "a probability constraint", "give the formula a weight instead"),
-        (r"\bcount\s*\([^|]*\|.*", "`count(...)`", "write the cardinality with `!` or `?` in the declaration, or with EXIST"),
-        (r"\bdomSize\s*\(.*?\)", "`domSize(...)`", "write the number itself"),
+        (r"^\s*(?:P|R|SE)\s*\(.*\)\s*=\s*[\d.]+\s*$", "a probability constraint", "give the formula a weight"),
+        (r"\bcount\s*\([^|]*\|.*", "`count(...)`", "say how many with `!` or `?` in the declaration, or with EXIST"),
+        (r"\bdomSize\s*\(.*", "`domSize(...)`", "write the number itself"),
         (r"\$\w*", "a macro (`$name`)", "write its value where it is used"),
-        (r"[\w'-]+(?:\|[\w'-]+)+\s*\(", "a group of predicates (`p|q(...)`)", "write one formula for each predicate"),
-        (r"\*\s*[^\W\d]\w*\s*\(", "`*P(...)` inside a formula", "write one formula with `P(...)` and one with `!P(...)`"),
+        (r"[\w'-]+(?:\|[\w'-]+)+\s*\(", "a group of predicates (`p|q(...)`)", "write one formula for each of them"),
+        (r"\*\s*[^\W\d]\w*\s*\(", "`*P(...)` inside a formula", "write one formula with `P(...)`, one with `!P(...)`"),
         (r":-", "a rule (`head :- body`)", "write `body => head`"),
         (r"\.\.\.", "a range of constants (`...`)", "list every constant"),
-        (r"<=(?!>)|<(?![=>-])|(?<![=<-])>=?", "comparing terms by size", "declare a predicate for the order and list its facts"),
-        (r"[\w'?]+\s*[-+*/%]\s*[\w'?]+(?=\s*[,)=])", "arithmetic on terms", "declare a predicate for the relation and list its facts"),
+        (r"<=(?!>)|<(?![=>-])|(?<![=<-])>=?", "comparing terms by size", "list the order as facts of a predicate"),
+        (r"[\w'?]+\s*[-+*/%]\s*[\w'?]+(?=\s*[,)=])", "arithmetic on terms", "list the results as facts of a predicate"),
         (r"(?<=[(,])\s*[^\W\d][\w']*\(", "a function inside an argument", "use a predicate with one more argument"),
-        (r"\[.*?\]|\{.*?\}", "this kind of bracket in a formula", "use ( and )"),
+        (r"[\[{]", "this kind of bracket in a formula", "use ( and )"),
     )
 )

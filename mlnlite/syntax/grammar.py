@@ -1,4 +1,7 @@
-"""One statement of text to one node of the tree, by the grammars in `grammars/`. No parser-library type leaves this module."""
+"""One statement of text to one node of the tree, by the grammars in `grammars/`.
+
+No type of the parser library leaves this module.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,12 @@ from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from mlnlite.errors import SyntaxMistake
-from mlnlite.source import Source
-from mlnlite.syntax.build import BUILDERS, Place
+from mlnlite.syntax.build import BUILDERS
 from mlnlite.syntax.explain import Failure, explain
 from mlnlite.syntax.nesting import refuse_deep_nesting
-from mlnlite.syntax.tree import Dialect
+from mlnlite.syntax.place import Language, Place
 
-_STARTS = {
+_STARTS: dict[Language, tuple[str, ...]] = {
     "standard": ("standard_statement", "standard_formula", "declaration", "type_declaration", "weight"),
     "prac": ("prac_statement", "prac_formula", "declaration", "type_declaration", "weight"),
     "evidence": ("fact", "type_declaration"),
@@ -23,16 +25,19 @@ _STARTS = {
 
 
 @cache
-def _parser(language: str) -> Lark:
-    file = "evidence.lark" if language == "evidence" else "mln.lark"
-    starts = list(_STARTS[language])
+def _parser(language: Language) -> Lark:
     return Lark.open_from_package(
-        "mlnlite.grammars", file, start=starts, parser="lalr", propagate_positions=True, maybe_placeholders=False
+        "mlnlite.grammars",
+        "evidence.lark" if language == "evidence" else "mln.lark",
+        start=list(_STARTS[language]),
+        parser="lalr",
+        propagate_positions=True,
+        maybe_placeholders=False,
     )
 
 
-def parse_node(rule: str, text: str, source: Source, offset: int, dialect: Dialect, *, evidence: bool = False) -> Any:  # noqa: ANN401
-    """The node that `rule` makes of `text`, which stands at `offset` of the source.
+def parse_node(rule: str, text: str, place: Place, language: Language) -> Any:  # noqa: ANN401
+    """The node that `rule` of a language makes of `text`, which stands at `place`.
 
     Returns:
         What the builder of the rule makes: a formula, a statement, a declaration, an expression, a fact.
@@ -40,19 +45,17 @@ def parse_node(rule: str, text: str, source: Source, offset: int, dialect: Diale
     Raises:
         SyntaxMistake: the text does not follow the rule; one diagnostic.
     """
-    place = Place(source, offset)
     refuse_deep_nesting(text, place)
     try:
-        tree = _parser("evidence" if evidence else dialect).parse(text, start=rule)
+        tree = _parser(language).parse(text, start=rule)
     except UnexpectedInput as error:
         at, expected = _where(error, len(text))
-        failure = Failure(place, text, at, frozenset(expected), dialect, rule)
-        raise SyntaxMistake([explain(failure)]) from None
+        raise SyntaxMistake([explain(Failure(place, text, at, frozenset(expected), language, rule))]) from None
     return _build(tree, place)
 
 
 def _where(error: UnexpectedInput, end: int) -> tuple[int, set[str]]:
-    state: Any = error.interactive_parser  # type: ignore[attr-defined]
+    state: Any = error.interactive_parser
     accepted = set(state.accepts())
     if isinstance(error, UnexpectedToken):
         return (end if error.token.type == "$END" else int(error.token.start_pos or 0)), accepted

@@ -10,10 +10,14 @@ from mlnlite.errors import Diagnostic
 from mlnlite.source import Source, Span
 from mlnlite.syntax.messages import mistake
 
+# ruff: noqa: RUF001 (signs that look like ours are the point here)
 # A line that ends like this goes on in the next one.
 _GOES_ON = ("^", "=>", "=", "!", ",", "(", "{", " v", ")v", "->", "&", "|", " and", " or", "∧", "∨", "→", "⇒")
 _EQUALS_V = re.compile(r"=\s*v$")
-_NEW_STATEMENT = re.compile(r"#|@|\*\w|[-+]?[.\d][^\s(),]*\s+[!(?]*\w|\w+\s*=\s*\{|(?:log|logx|logit|ln|exp|sqrt)\([^\s]*\)\s+[!(?\w]")
+_NEW_STATEMENT = re.compile(
+    r"#|@|\*\w|---|\w+\s*=\s*\{"  # a directive, a fixed weight, a closed predicate, a separator, a type
+    r"|(?:[-+]?[.\d][^\s(),]*|(?:log|logx|logit|ln|exp|sqrt)\(\S*\))\s+[!(?]*[^\W\d]"  # a weight and a formula
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +63,8 @@ def _goes_on(text: str) -> bool:
 def split_statements(code: Code, first: int = 0, last: int | None = None) -> Iterator[tuple[int, int]]:
     """Start and end offset of each statement between the offsets `first` and `last`.
 
-    A statement ends with its line, unless a parenthesis or brace is open or the line ends in a connective. A blank line,
-    or a line that is clearly another statement, ends it even then, so that one mistake does not swallow the file.
+    A statement ends with its line, unless a parenthesis or brace is open or the line ends in a connective. A blank
+    line, or one that is clearly another statement, ends it even then: one mistake shall not swallow the file.
     """
     start, end, depth, offset = -1, 0, 0, first
     for line in code.bare[first:last].split("\n"):

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from mlnlite.errors import SyntaxMistake
 from mlnlite.syntax import tree
-from mlnlite.syntax.build import Place
 from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.place import Place
 
 MAX_DEPTH = 200
 _HINT = "split the formula into several"
@@ -48,7 +48,7 @@ def _depths(text: str) -> Iterator[tuple[int, int]]:
         yield match.start(), level + negations
 
 
-def refuse_long_expression(weight: tree.WeightExpression, place: Place) -> None:
+def refuse_long_expression(weight: tree.WeightExpression) -> None:
     """Passes a weight whose operations are nested at most `MAX_DEPTH` deep, sums and products included.
 
     Raises:

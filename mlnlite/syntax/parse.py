@@ -14,9 +14,10 @@ from mlnlite.syntax.files import read_source
 from mlnlite.syntax.includes import File, load
 from mlnlite.syntax.lines import split_statements
 from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.place import Place
 from mlnlite.syntax.queries import parse_atom_query, split_queries
 from mlnlite.syntax.statements import read_statement
-from mlnlite.syntax.tables import Group, Tables, add, can_gather, finish, read_row
+from mlnlite.syntax.tables import Gathering, add, can_gather, finish, read_row
 from mlnlite.syntax.tree import Dialect, Program
 
 __all__ = ["parse_atom_query", "parse_model", "read_source", "split_queries"]
@@ -31,7 +32,7 @@ class _Reading:
     Attributes:
         dialect: of the model.
         marked: a variable with a question mark, if there is one.
-        declared: the declaration of each predicate so far.
+        declared: the first declaration of each predicate so far.
         mistakes: what was wrong so far.
     """
 
@@ -70,77 +71,59 @@ def parse_model(sources: Sequence[Source], dialect: Dialect | None = None) -> Pr
 
 
 def _in_order(mistakes: list[Diagnostic]) -> list[Diagnostic]:
-    """Files in the order in which they were met, places in a file from top to bottom."""
+    """Files in the order in which they were met, places in a file from top to bottom, each mistake once."""
     names = {d.span.source.name: None for d in mistakes if d.span}
     rank = {name: number for number, name in enumerate(names)}
     ordered = sorted(mistakes, key=lambda d: (rank[d.span.source.name], d.span.start) if d.span else (-1, 0))
-    return list(dict.fromkeys(ordered))
+    return list({str(diagnostic): diagnostic for diagnostic in ordered}.values())
 
 
 def _read_files(files: Sequence[File], reading: _Reading) -> tuple[tree.Statement, ...]:
-    tables = Tables(reading.dialect)
-    items: list[tree.Statement | Group] = []
+    gathering = Gathering(reading.dialect)
     for file in files:
-        _read_file(file, reading, tables, items)
+        _read_file(file, reading, gathering)
     if reading.dialect == "prac":
-        for group in tables.groups.values():
+        for group in gathering.groups.values():
             reading.mistakes += group_mistakes(group, reading.marked)
-    return tuple(finish(item) if isinstance(item, Group) else item for item in items)
+    return finish(gathering)
 
 
-def _read_file(file: File, reading: _Reading, tables: Tables, items: list[tree.Statement | Group]) -> None:
-    source, code = file.code.source, file.code.text
+def _read_file(file: File, reading: _Reading, gathering: Gathering) -> None:
     pending = Pending()
     for start, end in split_statements(file.code):
+        place, text = Place(file.code.source, start), file.code.text[start:end]
         if len(reading.mistakes) >= MAX_MISTAKES:
-            reading.mistakes.append(mistake("E199", Span(source, start, end), limit=MAX_MISTAKES))
+            reading.mistakes.append(mistake("E199", place.span(0, len(text)), limit=MAX_MISTAKES))
             return
-        text = code[start:end]
         try:
             if text[0] == "#":
-                pending = read_directive(text, source, start, pending)
-                if start in file.included:
-                    _read_include(file, start, end, reading, items)
-                continue
-            row = False if pending.directives else read_row(tables, source, text, start)
-            if row is False:
-                _read_one(text, source, start, pending, reading, tables, items)
-                pending = Pending()
-            elif isinstance(row, Group):
-                items.append(row)
+                pending = read_directive(text, place, pending)
+                _read_include(file, place.span(0, len(text)), reading, gathering)
+            else:
+                waiting, pending = pending, Pending()
+                if waiting.directives or not read_row(gathering, text, place):
+                    statement = read_statement(text, place, reading.dialect, reading.declared)
+                    _add(waiting.applied(statement), reading, gathering)
         except SyntaxMistake as error:
             reading.mistakes += error.diagnostics
-            pending = Pending()
     reading.mistakes += pending.left_over()
 
 
-def _read_include(file: File, start: int, end: int, reading: _Reading, items: list[tree.Statement | Group]) -> None:
-    path, included = file.included[start]
+def _read_include(file: File, span: Span, reading: _Reading, gathering: Gathering) -> None:
+    path, included = file.included.get(span.start, ("", None))
     if included:
-        program = Program(_read_files([included], reading), reading.dialect, Span(included.code.source, 0, 0))
-        items.append(tree.Include(path, program, Span(file.code.source, start, end)))
+        source = included.code.source
+        program = Program(_read_files([included], reading), reading.dialect, Span(source, 0, len(source.text)))
+        gathering.items.append(tree.Include(path, program, span))
 
 
-def _read_one(
-    text: str,
-    source: Source,
-    start: int,
-    pending: Pending,
-    reading: _Reading,
-    tables: Tables,
-    items: list[tree.Statement | Group],
-) -> None:
-    statement = pending.applied(read_statement(text, source, start, reading.dialect, reading.declared))
+def _add(statement: tree.Statement, reading: _Reading, gathering: Gathering) -> None:
     if isinstance(statement, tree.PredicateDeclaration):
         reading.declared.setdefault(statement.name, statement)
-    if not isinstance(statement, tree.FormulaStatement):
-        items.append(statement)
-        return
-    if reading.dialect == "prac":
-        reading.mistakes += prac_mistakes(statement.formula, reading.marked)
-    if can_gather(statement):
-        group = add(tables, statement)
-        if group:
-            items.append(group)
-    else:
-        items.append(statement)
+    if isinstance(statement, tree.FormulaStatement):
+        if reading.dialect == "prac":
+            reading.mistakes += prac_mistakes(statement.formula, reading.marked)
+        if can_gather(statement):
+            add(gathering, statement)
+            return
+    gathering.items.append(statement)

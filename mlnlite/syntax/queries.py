@@ -9,6 +9,7 @@ from mlnlite.errors import SyntaxMistake
 from mlnlite.source import Source, Span
 from mlnlite.syntax.grammar import parse_node
 from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.place import Place
 from mlnlite.syntax.tree import Dialect, Formula
 
 _PART = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"|[(),]|[^(),"]+|"')
@@ -28,12 +29,14 @@ def parse_atom_query(text: str, dialect: Dialect) -> Formula:
     if not text.strip():
         raise SyntaxMistake([mistake("E150", None, "name a predicate, an atom such as `Smokes(Ann)`, or a formula")])
     start = len(text) - len(text.lstrip())
-    formula: Formula = parse_node(f"{dialect}_formula", text.strip(), source, start, dialect)
+    formula: Formula = parse_node(f"{dialect}_formula", text.strip(), Place(source, start), dialect)
     return formula
 
 
 def split_queries(text: str) -> list[str]:
-    """The items of a comma-separated list; a comma inside parentheses, quotes or a list of quantified variables does not split.
+    """The items of a comma-separated list.
+
+    A comma inside parentheses, quotes or a list of quantified variables does not split.
 
     Raises:
         SyntaxMistake: an item is empty.

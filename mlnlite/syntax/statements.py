@@ -5,24 +5,26 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from mlnlite.source import Source
 from mlnlite.syntax import tree
 from mlnlite.syntax.grammar import parse_node
+from mlnlite.syntax.place import Place
 
 _TYPE = re.compile(r"[^\W\d][\w'-]*\s*=\s*\{")
-# An atom whose arguments are plain words, with or without markers: a declaration, or a formula without weight.
-_PLAIN_ATOM = re.compile(r"([^\W\d][\w'-]*)\s*(?:\(\s*([^\W\d][\w'-]*\s*[!?]?(?:\s*,\s*[^\W\d][\w'-]*\s*[!?]?)*)\s*\))?")
+# An atom whose arguments are plain words, with or without markers: a declaration or a formula without weight.
+_PLAIN_ATOM = re.compile(
+    r"([^\W\d][\w'-]*)\s*(?:\(\s*([^\W\d][\w'-]*\s*[!?]?(?:\s*,\s*[^\W\d][\w'-]*\s*[!?]?)*)\s*\))?"
+)
 # Marks that only a declaration has: a star in front, `!` or `?` after an argument.
-_DECLARATION_MARK = re.compile(r"\*\s*\w|[^\W\d][\w'-]*\s*\([^()]*[\w']\s*[!?]\s*[,)]")
+_DECLARATION_MARK = re.compile(r"\*\s*\w|[^\W\d][\w'-]*\s*\([^()]*[\w']\s*[!?]\s*[!?,)]")
 
 
 def read_statement(
-    text: str, source: Source, start: int, dialect: tree.Dialect, declared: Mapping[str, tree.PredicateDeclaration]
+    text: str, place: Place, dialect: tree.Dialect, declared: Mapping[str, tree.PredicateDeclaration]
 ) -> tree.TypeDeclaration | tree.PredicateDeclaration | tree.FormulaStatement:
-    """The statement `text`, which stands at offset `start`.
+    """The statement `text`, which stands at `place`.
 
-    A bare atom with plain words as arguments declares its predicate the first time, and again if it is the same; after that
-    `P(x)` with other words is a formula without weight.
+    A bare atom with plain words as arguments declares its predicate the first time, and again if it is the same; after
+    that `P(x)` with other words is a formula without weight.
 
     Raises:
         SyntaxMistake: it is no statement of the dialect.
@@ -33,7 +35,7 @@ def read_statement(
     elif _DECLARATION_MARK.match(text) or declares(text, declared):
         rule = "declaration"
     node: tree.TypeDeclaration | tree.PredicateDeclaration | tree.FormulaStatement
-    node = parse_node(rule, text, source, start, dialect)
+    node = parse_node(rule, text, place, dialect)
     return node
 
 

@@ -1,7 +1,7 @@
 """Formulas that differ only in constants and weights, gathered into one `FormulaTable`; big files come through here.
 
-A line `weight formula` is cut at its constants. What is left is its key. The first line of each key is parsed by the grammar, and
-if the constants found by cutting are constants for the grammar too, all further lines of that key are rows without parsing.
+A line `weight formula` is cut at its constants. What is left is its key. The first line of each key is parsed by the
+grammar; if what was cut out are constants for the grammar too, all further lines of that key are rows without parsing.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from typing import TypeAlias, assert_never
 
 from mlnlite.errors import SyntaxMistake
-from mlnlite.source import Source, Span
+from mlnlite.source import Span
 from mlnlite.syntax import tree
 from mlnlite.syntax.grammar import parse_node
+from mlnlite.syntax.place import Place
 from mlnlite.syntax.walk import constants_of, variables_of, with_holes
 
 # Weight, blanks, formula: of one line, without quotes. A weight is a number or a function of something without blanks.
@@ -50,105 +51,99 @@ class Group:
     unquoted: list[Sequence[str]] = field(default_factory=list)
 
 
-# How the constants that were cut out fill the holes: a number is one of them, a text stands in the key.
+# How the constants that were cut out fill the holes: a number is one of them, a text stands in the key itself.
 _Filling: TypeAlias = tuple[int | str, ...] | None
 
 
 @dataclass(slots=True)
-class Tables:
-    """The formulas gathered so far.
+class Gathering:
+    """The statements of a program under construction.
 
     Attributes:
         dialect: how to read them.
+        items: the statements so far; a group stands where its first formula stood.
         groups: the groups by shape.
         keys: for each key seen its group and filling (None: the constants as they come), or None if it must be parsed.
         weights: the weights read so far, by text.
     """
 
     dialect: tree.Dialect
+    items: list[tree.Statement | Group] = field(default_factory=list)
     groups: dict[tree.Formula, Group] = field(default_factory=dict)
     keys: dict[str, tuple[Group, _Filling] | None] = field(default_factory=dict)
     weights: dict[str, tree.WeightExpression] = field(default_factory=dict)
 
 
-def read_row(tables: Tables, source: Source, text: str, start: int) -> Group | None | bool:
-    """Reads one line as a row of a group.
-
-    Returns:
-        False if the line must be parsed as a statement, a group if the row is the first of a new group, else None.
-    """
+def read_row(gathering: Gathering, text: str, place: Place) -> bool:
+    """Adds the line `text`, which stands at `place`, to its group; False if it must be parsed as a statement."""
     match = _WEIGHTED.fullmatch(text)
     if match is None:
         return False
-    parts = _CONSTANT[tables.dialect].split(match[2])
+    parts = _CONSTANT[gathering.dialect].split(match[2])
     key = "\0".join(parts[::2])
-    try:
-        known = tables.keys[key]
-    except KeyError:
-        return _read_first(tables, source, match, start, key)
-    if known is None:
-        return False
-    weight = _weight(tables, match[1], source, start)
-    if weight is None:
+    if key not in gathering.keys:
+        return _read_first(gathering, match, place, key)
+    known = gathering.keys[key]
+    weight = known and _weight(gathering, match[1], place)
+    if not (known and weight):
         return False
     group, filling = known
     constants = parts[1::2]
     group.unquoted.append(constants)
-    group.rows.append(constants if filling is None else [constants[f] if isinstance(f, int) else f for f in filling])
+    group.rows.append(constants if filling is None else [f if isinstance(f, str) else constants[f] for f in filling])
     group.weights.append(weight)
-    group.spans.append(Span(source, start, start + len(text)))
-    return None
+    group.spans.append(place.span(0, len(text)))
+    return True
 
 
-def _weight(tables: Tables, text: str, source: Source, start: int) -> tree.WeightExpression | None:
-    weight = tables.weights.get(text)
+def _weight(gathering: Gathering, text: str, place: Place) -> tree.WeightExpression | None:
+    weight = gathering.weights.get(text)
     if weight is None:
         try:
-            weight = parse_node("weight", text, source, start, tables.dialect).value
+            weight = _without_spans(parse_node("weight", text, place, gathering.dialect).value)
         except SyntaxMistake:
             return None
-        weight = tables.weights[text] = without_spans(weight)
+        gathering.weights[text] = weight
     return weight
 
 
-def without_spans(weight: tree.WeightExpression) -> tree.WeightExpression:
+def _without_spans(weight: tree.WeightExpression) -> tree.WeightExpression:
     """The same weight for another place: rows know where they stand themselves."""
     match weight:
         case tree.Number():
             return replace(weight, span=None)
         case tree.Call():
-            return replace(weight, arguments=tuple(map(without_spans, weight.arguments)), span=None)
+            return replace(weight, arguments=tuple(map(_without_spans, weight.arguments)), span=None)
         case tree.Arithmetic():
-            left = None if weight.left is None else without_spans(weight.left)
-            return replace(weight, left=left, right=without_spans(weight.right), span=None)
+            left = None if weight.left is None else _without_spans(weight.left)
+            return replace(weight, left=left, right=_without_spans(weight.right), span=None)
+    assert_never(weight)
 
 
-def _read_first(tables: Tables, source: Source, match: re.Match[str], start: int, key: str) -> Group | None | bool:
+def _read_first(gathering: Gathering, match: re.Match[str], place: Place, key: str) -> bool:
     """Parses the first line of a key and remembers how further lines are to be read."""
-    tables.keys[key] = None
+    gathering.keys[key] = None
     try:
-        statement = parse_node(f"{tables.dialect}_statement", match[0], source, start, tables.dialect)
+        statement = parse_node(f"{gathering.dialect}_statement", match[0], place, gathering.dialect)
     except SyntaxMistake:
         return False
     if not can_gather(statement):
         return False
-    filling = _filling(statement.formula, [m.span(1) for m in _CONSTANT[tables.dialect].finditer(match[2])], start + match.start(2))
-    new = add(tables, statement)
-    group = tables.groups[with_holes(statement.formula)]
-    if filling is not False:
-        tables.keys[key] = group, filling
+    cuts = [cut.span(1) for cut in _CONSTANT[gathering.dialect].finditer(match[2])]
+    group = add(gathering, statement)
     group.unquoted.append(group.rows[-1])
-    return new
+    holes = _places(statement.formula, cuts, place.offset + match.start(2))
+    if holes is not None:
+        gathering.keys[key] = group, None if holes == list(range(len(cuts))) else tuple(holes)
+    return True
 
 
-def _filling(formula: tree.Formula, cuts: list[tuple[int, int]], offset: int) -> _Filling | bool:
-    """How cut constants fill the holes of a formula; False if a cut is not a constant of it."""
-    places = {(start + offset, end + offset): number for number, (start, end) in enumerate(cuts)}
+def _places(formula: tree.Formula, cuts: list[tuple[int, int]], offset: int) -> list[int | str] | None:
+    """For each constant of a formula the number of its cut, or itself; None if a cut is not a constant."""
+    numbers = {(start + offset, end + offset): number for number, (start, end) in enumerate(cuts)}
     constants = constants_of(formula)
-    filling = tuple(places.pop((c.span.start, c.span.end), c.name) if c.span else c.name for c in constants)
-    if places:
-        return False
-    return None if filling == tuple(range(len(cuts))) else filling
+    places = [numbers.pop((c.span.start, c.span.end), c.name) if c.span else c.name for c in constants]
+    return None if numbers else places
 
 
 def can_gather(statement: tree.FormulaStatement) -> bool:
@@ -158,22 +153,27 @@ def can_gather(statement: tree.FormulaStatement) -> bool:
     return not any(variable.plus for variable in variables_of(statement.formula))
 
 
-def add(tables: Tables, statement: tree.FormulaStatement) -> Group | None:
-    """Adds a parsed formula to its group; the group, if it is new."""
+def add(gathering: Gathering, statement: tree.FormulaStatement) -> Group:
+    """Adds a parsed formula to its group, which may be new."""
     assert statement.weight is not None
     assert statement.span is not None
     shape = with_holes(statement.formula)
-    known = tables.groups.get(shape)
-    group = known or Group(statement, shape)
+    group = gathering.groups.get(shape)
+    if group is None:
+        group = gathering.groups[shape] = Group(statement, shape)
+        gathering.items.append(group)
     group.rows.append([constant.name for constant in constants_of(statement.formula)])
     group.weights.append(statement.weight)
     group.spans.append(statement.span)
-    tables.groups[shape] = group
-    return None if known else group
+    return group
 
 
-def finish(group: Group) -> tree.FormulaStatement | tree.FormulaTable:
-    """The statement itself if the group has one row only, else the table."""
+def finish(gathering: Gathering) -> tuple[tree.Statement, ...]:
+    """The statements; a group with one row only is the formula it came from, any other a table."""
+    return tuple(_table(item) if isinstance(item, Group) else item for item in gathering.items)
+
+
+def _table(group: Group) -> tree.FormulaStatement | tree.FormulaTable:
     if len(group.rows) == 1:
         return group.first
     shared: dict[str, str] = {}

@@ -3,6 +3,7 @@
 Spans say where a node stood and do not count for equality, so `parse(write(t)) == t` can be tested.
 """
 
+# ruff: noqa: RUF009 (a span is a field, not a value)
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ Dialect: TypeAlias = Literal["standard", "prac"]
 
 
 def _span() -> Span | None:
-    return field(default=None, compare=False, repr=False)  # type: ignore[return-value]
+    return field(default=None, compare=False, repr=False)
 
 
 # --- terms
@@ -62,7 +63,7 @@ class Atom:
 
 @dataclass(frozen=True, slots=True)
 class Equality:
-    """`t = u`. (`t != u` and `t =/= u` are its negation.)"""
+    """`t = u`; `t != u` and `t =/= u` are its negation."""
 
     left: Term
     right: Term
@@ -213,7 +214,7 @@ class FormulaTable:
     """Soft formulas that differ only in constants and weights, as one formula with holes and a table.
 
     Attributes:
-        formula: the common shape, with `Hole(0)`, `Hole(1)`, ... for what differs. Repeated constants are separate holes.
+        formula: the common shape, with `Hole(0)`, `Hole(1)`, ... in place of every constant, equal ones too.
         columns: for each hole the constants of all rows, `columns[hole][row]`.
         weights: one weight for each row.
         spans: where each row stands.

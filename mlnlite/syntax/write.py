@@ -8,6 +8,7 @@ from typing import assert_never
 
 from mlnlite.syntax import tree
 from mlnlite.syntax.build import is_variable
+from mlnlite.syntax.dialects import LOOKS_VARIABLE
 from mlnlite.syntax.statements import declares
 from mlnlite.syntax.walk import variables_of
 
@@ -30,7 +31,7 @@ def write_model(program: tree.Program) -> str:
 
 def write_formula(formula: tree.Formula, dialect: tree.Dialect) -> str:
     """The text of a formula. `Hole(0)` of a formula table is written `<1>`, which does not read back."""
-    return _formula(formula, _word_writer(dialect, variables_of(formula) != []))
+    return _formula(formula, _word_writer(dialect, {variable.name for variable in variables_of(formula)}))
 
 
 def write_weight(weight: tree.WeightExpression) -> str:
@@ -45,7 +46,9 @@ def write_weight(weight: tree.WeightExpression) -> str:
         case tree.Call(function, arguments):
             return f"{function}({','.join(map(write_weight, arguments))})"
         case tree.Arithmetic(operator, left, right):
-            return ("" if left is None else _operand(left)) + operator + _operand(right)
+            if left is None:
+                return f"{operator}({write_weight(right)})"
+            return _operand(left) + operator + _operand(right)
     assert_never(weight)
 
 
@@ -81,9 +84,8 @@ def _constant(name: str) -> str:
     return name if _WORD.fullmatch(name) else _quoted(name)
 
 
-def _word_writer(dialect: tree.Dialect, has_variables: bool) -> _WriteWord:
-    """How to write terms. Lower-case constants are quoted unless `?x` elsewhere shows that they are none."""
-    plain = dialect == "prac" and has_variables
+def _word_writer(dialect: tree.Dialect, variables: set[str]) -> _WriteWord:
+    """How to write terms; a constant that could be taken for a variable is quoted."""
     sign = "?" if dialect == "prac" else ""
 
     def write(term: tree.Term, left: bool) -> str:
@@ -91,8 +93,10 @@ def _word_writer(dialect: tree.Dialect, has_variables: bool) -> _WriteWord:
             case tree.Variable(name, plus):
                 return f"{'+' if plus else ''}{sign}{name}"
             case tree.Constant(name):
-                readable = (_NAME if left else _WORD).fullmatch(name) and (plain or not is_variable(name))
-                return name if readable else _quoted(name)
+                doubtful = (
+                    name in variables or LOOKS_VARIABLE.fullmatch(name) if sign and variables else is_variable(name)
+                )
+                return name if (_NAME if left else _WORD).fullmatch(name) and not doubtful else _quoted(name)
             case tree.Hole(index):
                 return f"<{index + 1}>"
         assert_never(term)
@@ -102,7 +106,8 @@ def _word_writer(dialect: tree.Dialect, has_variables: bool) -> _WriteWord:
 
 def _plain_words(program: tree.Program) -> _WriteWord:
     """The writer of terms for a whole program."""
-    return _word_writer(program.dialect, any(variables_of(formula) for formula in _formulas(program)))
+    variables = {v.name for formula in _formulas(program) for v in variables_of(formula)}
+    return _word_writer(program.dialect, variables)
 
 
 def _formulas(program: tree.Program) -> Iterator[tree.Formula]:
@@ -117,7 +122,9 @@ def _formulas(program: tree.Program) -> Iterator[tree.Formula]:
 def _formula(formula: tree.Formula, word: _WriteWord) -> str:
     match formula:
         case tree.Atom(predicate, arguments):
-            return f"{predicate}({', '.join(word(argument, False) for argument in arguments)})" if arguments else predicate
+            return (
+                f"{predicate}({', '.join(word(argument, False) for argument in arguments)})" if arguments else predicate
+            )
         case tree.Equality():
             text = f"{word(formula.left, True)} = {word(formula.right, False)}"
             return f"({text})" if text.startswith("+") else text
@@ -216,7 +223,12 @@ def _rows(table: tree.FormulaTable, word: _WriteWord) -> Iterator[str]:
         return "\0"
 
     first, *texts = _formula(table.formula, cut).split("\0")
-    columns = [[word(tree.Constant(name), left) for name in table.columns[index]] for index, left in sides]
+    columns = [_column(table.columns[index], left, word) for index, left in sides]
     words = zip(*columns, strict=True) if columns else iter([()] * len(table.weights))
     for weight, row in zip(table.weights, words, strict=True):
         yield f"{write_weight(weight)} {first}" + "".join(a + b for a, b in zip(row, texts, strict=True))
+
+
+def _column(names: tuple[str, ...], left: bool, word: _WriteWord) -> list[str]:
+    written = {name: word(tree.Constant(name), left) for name in set(names)}
+    return [written[name] for name in names]
