@@ -138,7 +138,7 @@ def cells_of(rows: Conjunctions, cardinality: Int32) -> tuple[list[Cells], float
     for c in range(k):
         at = (part.row, columns[part.row, c])
         part = _place(part, c, (rows.variable[at], rows.value[at], rows.equal[at]), cardinality)
-    return _gather(part)
+    return gather(part.scope, part.value, part.amount)
 
 
 def _place(part: _Partial, column: int, literal: _Column, cardinality: Int32) -> _Partial:
@@ -178,14 +178,23 @@ def _others(part: _Partial, column: int, at: tuple[Int64, Int32, Int32], cardina
     return copies
 
 
-def _gather(part: _Partial) -> tuple[list[Cells], float]:
-    """Sorts the literals of each cell by variable and the cells by arity."""
-    arity = (part.scope >= 0).sum(axis=1)
+def gather(scope: Int32, value: Int32, amount: Float) -> tuple[list[Cells], float]:
+    """Sorts the literals of each cell by variable and the cells by arity.
+
+    Args:
+        scope: shape (n, k), -1 where there is no literal.
+        value: shape (n, k).
+        amount: shape (n,).
+
+    Returns:
+        Cells, those of equal arity together, and the amount of those without a literal.
+    """
+    arity = (scope >= 0).sum(axis=1)
     unused = np.iinfo(np.int32).max
-    order = np.argsort(np.where(part.scope < 0, unused, part.scope), axis=1)
-    scope, value = (np.take_along_axis(a, order, axis=1) for a in (part.scope, part.value))
+    order = np.argsort(np.where(scope < 0, unused, scope), axis=1)
+    scope, value = (np.take_along_axis(a, order, axis=1) for a in (scope, value))
     cells = []
     for k in np.unique(arity[arity > 0]):
         rows = arity == k
-        cells.append(Cells(scope[rows, :k], value[rows, :k], part.amount[rows]))
-    return cells, float(part.amount[arity == 0].sum())
+        cells.append(Cells(scope[rows, :k], value[rows, :k], amount[rows]))
+    return cells, float(amount[arity == 0].sum())

@@ -16,6 +16,8 @@ from mlnlite.ground.network import Bool, Float, Int64
 
 _SLICE_OVERHEAD = 2000
 _STRIDED = 3
+_SHORT = 32
+_ONE_THREAD = 1 << 17
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,19 +48,27 @@ def fill(n_tables: int, shape: Sequence[int], cells: Sequence[Placed]) -> Float:
     Returns:
         Shape (n_tables, *shape).
     """
-    tables = np.zeros((n_tables, *shape))
-    soft = [_pick(c, np.isfinite(c.amount)) for c in cells]
-    hard = [_pick(c, ~np.isfinite(c.amount)) for c in cells]
-    for part, forbid in ((soft, False), (hard, True)):
-        part = [c for c in part if len(c.amount)]
-        if part and _slices_are_cheaper(tables, part):
-            for c in part:
-                _add_slices(tables, c)
-        elif part and forbid:
-            counts = [Placed(c.table, c.axis, c.value, np.ones(len(c.table))) for c in part]
-            tables += np.where(_on_used_axes(tables.shape, counts) > 0.5, -np.inf, 0.0)
-        elif part:
-            tables += _on_used_axes(tables.shape, part)
+    shape = (n_tables, *shape)
+    soft = [part for c in cells if len((part := _pick(c, np.isfinite(c.amount))).amount)]
+    hard = [part for c in cells if len((part := _pick(c, ~np.isfinite(c.amount))).amount)]
+    tables = _total(shape, soft)
+    if hard and _slices_are_cheaper(shape, hard):
+        for c in hard:
+            _add_slices(tables, c)
+    elif hard:
+        counts = [Placed(c.table, c.axis, c.value, np.ones(len(c.table))) for c in hard]
+        tables += np.where(_on_used_axes(shape, counts) > 0.5, -np.inf, 0.0)
+    return tables
+
+
+def _total(shape: tuple[int, ...], cells: Sequence[Placed]) -> Float:
+    """Sums of cells with finite amounts."""
+    if cells and not _slices_are_cheaper(shape, cells):
+        sums = _on_used_axes(shape, cells)
+        return sums if sums.shape == shape else sums + np.zeros(shape)
+    tables = np.zeros(shape)
+    for c in cells:
+        _add_slices(tables, c)
     return tables
 
 
@@ -67,15 +77,14 @@ def _pick(cells: Placed, which: Bool) -> Placed:
     return Placed(cells.table[which], cells.axis[which], cells.value[which], cells.amount[which])
 
 
-def _slices_are_cheaper(tables: Float, cells: Sequence[Placed]) -> bool:
+def _slices_are_cheaper(shape: tuple[int, ...], cells: Sequence[Placed]) -> bool:
     """Whether adding each cell to its slice beats sums along all axes."""
-    n_axes = tables.ndim - 1
+    sizes = np.array(shape[1:], float)
+    size = float(np.prod(sizes))
     touched = sum(
-        _STRIDED * float(np.sum(tables[0].size / np.prod(np.array(tables.shape[1:])[c.axis], axis=1, dtype=float)))
-        + _SLICE_OVERHEAD * len(c.table)
-        for c in cells
+        _STRIDED * float(np.sum(size / np.prod(sizes[c.axis], axis=1))) + _SLICE_OVERHEAD * len(c.table) for c in cells
     )
-    return touched < n_axes * (tables.size + _SLICE_OVERHEAD)
+    return touched < len(sizes) * (shape[0] * size + _SLICE_OVERHEAD)
 
 
 def _add_slices(tables: Float, cells: Placed) -> None:
@@ -104,20 +113,36 @@ def _sums(n_tables: int, sizes: Int64, cells: Sequence[Placed]) -> Float:
     size = int(np.prod(sizes))
     stride = size // np.cumprod(sizes)
     base = _base_values(sizes, cells)
-    flat = np.zeros(n_tables * size)
-    for c in cells:
-        place, amount = _entries(c, sizes, stride, base)
-        flat += np.bincount(place + int(base @ stride), amount, minlength=len(flat))
-    slabs = flat.reshape(-1, size // sizes[0]) if n_tables == 1 else flat[None]
-    for slab in slabs:
+    entries = [_entries(c, sizes, stride, base) for c in cells]
+    place, amount = (np.concatenate(part) for part in zip(*entries, strict=True))
+    flat = np.asarray(np.bincount(place + int(base @ stride), amount, minlength=n_tables * size), np.float64)
+    head = n_tables == 1 and len(sizes) > 1
+    for slab in flat.reshape(sizes[0], -1) if head else [flat]:
         if slab.any():  # most often empty where a variable that is about to be eliminated has its base value
-            for axis in range(1, len(sizes)):
-                _spread(slab.reshape(-1, sizes[axis], stride[axis]), int(base[axis]))
-    _spread(flat.reshape(-1, sizes[0], stride[0]), int(base[0]))
+            _spread(slab, sizes[head:], base[head:])
+    if head:
+        _spread_axis(flat.reshape(1, sizes[0], -1), int(base[0]))
     return flat
 
 
-def _spread(view: Float, base: int) -> None:
+def _spread(flat: Float, sizes: Int64, base: Int64) -> None:
+    """Sums along all axes of tables of the given sizes, in place; along the last few axes as a matrix product."""
+    stride = int(np.prod(sizes)) // np.cumprod(sizes)
+    short = stride * sizes <= _SHORT
+    for axis in np.flatnonzero(~short).tolist():
+        _spread_axis(flat.reshape(-1, sizes[axis], stride[axis]), int(base[axis]))
+    if short.any():
+        tail = int(np.prod(sizes[short]))
+        matrix = np.eye(tail)
+        for axis in np.flatnonzero(short).tolist():
+            _spread_axis(matrix.reshape(-1, sizes[axis], stride[axis]), int(base[axis]))
+        rows = flat.reshape(-1, tail)
+        block = max(1, _ONE_THREAD // tail**2)  # matrix products so small that no library starts threads for them
+        for begin in range(0, len(rows), block):
+            rows[begin : begin + block] = rows[begin : begin + block] @ matrix
+
+
+def _spread_axis(view: Float, base: int) -> None:
     """Adds what stands at the base value of the middle axis to its other values."""
     for value in range(view.shape[1]):
         if value != base:

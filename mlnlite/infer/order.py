@@ -10,10 +10,13 @@ from math import prod
 from typing import Literal
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from mlnlite.ground.network import Int32, Int64
 
-Rule = Literal["fill", "weight"]
+Rule = Literal["fill", "weight", "sweep"]
+_EXPENSIVE = 1 << 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,21 +51,37 @@ class TooWide:
     log2_size: float
 
 
-def neighbours(n: int, scopes: Sequence[Int32]) -> list[set[int]]:
-    """For each of `n` variables the others that share a row of one of the arrays with it."""
+def _edges(n: int, scopes: Sequence[Int32]) -> tuple[Int64, Int64]:
+    """The pairs of `n` variables that share a row of one of the arrays, each once."""
     pairs = [np.zeros(0, np.int64)]
     for scope in scopes:
         pairs += [scope[:, i].astype(np.int64) * n + scope[:, j] for i, j in combinations(range(scope.shape[1]), 2)]
     start, end = np.divmod(np.unique(np.concatenate(pairs)), n)
+    return start, end
+
+
+def _neighbours(n: int, edges: tuple[Int64, Int64]) -> list[set[int]]:
+    """The neighbours of each variable."""
     adjacent: list[set[int]] = [set() for _ in range(n)]
-    for u, v in zip(start.tolist(), end.tolist(), strict=True):
+    for u, v in zip(edges[0].tolist(), edges[1].tolist(), strict=True):
         adjacent[u].add(v)
         adjacent[v].add(u)
     return adjacent
 
 
+def _sweep(n: int, edges: tuple[Int64, Int64]) -> list[int]:
+    """Place of each variable in a sweep from one end of the graph to the other (Cuthill and McKee 1969)."""
+    graph = csr_matrix((np.ones(len(edges[0]), np.int8), edges), shape=(n, n))
+    place = np.empty(n, np.int64)
+    place[reverse_cuthill_mckee(graph + graph.T, symmetric_mode=True)] = np.arange(n)
+    return place.tolist()
+
+
 def plan(cardinality: Int32, scopes: Sequence[Int32], limit: int) -> Tree | TooWide:
-    """A clique tree by greedy elimination: fewest fill edges first, smallest table first where that fails.
+    """A clique tree by greedy elimination: fewest fill edges first.
+
+    Where that is expensive, the cheapest of it, a sweep from one end of the graph to the other (which is best for
+    long grids, such as anything that repeats in time), and smallest table first.
 
     Args:
         cardinality: shape (n,).
@@ -70,15 +89,19 @@ def plan(cardinality: Int32, scopes: Sequence[Int32], limit: int) -> Tree | TooW
         limit: largest number of entries of a table.
     """
     bits = np.log2(np.maximum(cardinality, 2)).tolist()
-    rules: tuple[Rule, Rule] = ("fill", "weight")
-    failed = []
+    n, edges = len(cardinality), _edges(len(cardinality), scopes)
+    rules: tuple[Rule, ...] = ("fill", "sweep", "weight")
+    trees, failed = [], []
     for rule in rules:
-        adjacent = neighbours(len(cardinality), scopes)
-        order = _greedy(_Graph(adjacent, bits, float(np.log2(limit)) + 1e-9, rule, {}))
-        if not isinstance(order, TooWide):
-            return _tree(order, cardinality)
-        failed.append(order)
-    return min(failed, key=lambda f: f.log2_size)
+        place = _sweep(n, edges) if rule == "sweep" else []
+        order = _greedy(_Graph(_neighbours(n, edges), bits, float(np.log2(limit)) + 1e-9, rule, place, {}))
+        if isinstance(order, TooWide):
+            failed.append(order)
+        else:
+            trees.append(_tree(order, cardinality))
+        if trees and sum(trees[-1].sizes) <= _EXPENSIVE:
+            break
+    return min(trees, key=lambda t: sum(t.sizes)) if trees else min(failed, key=lambda f: f.log2_size)
 
 
 @dataclass(slots=True)
@@ -90,6 +113,7 @@ class _Graph:
         bits: log2 cardinality of each variable.
         limit: log2 size of the largest table that may be made.
         rule: what the choice goes by.
+        place: of each variable in the sweep.
         missing: for each variable whose table is within the limit, the edges missing between its neighbours.
     """
 
@@ -97,6 +121,7 @@ class _Graph:
     bits: list[float]
     limit: float
     rule: Rule
+    place: list[int]
     missing: dict[int, int]
 
 
@@ -115,8 +140,10 @@ def _measure(graph: _Graph, v: int) -> None:
 
 
 def _key(graph: _Graph, v: int) -> tuple[float, float, int]:
-    """What decides: fewest missing edges, then smallest table; or the table alone."""
+    """What decides: fewest missing edges, then smallest table; or the place in the sweep; or the table alone."""
     weight = _weight(graph, v)
+    if graph.rule == "sweep":
+        return graph.place[v], 0.0, v
     return (graph.missing[v], weight, v) if graph.rule == "fill" else (weight, 0.0, v)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from mlnlite.errors import QueryMistake
 from mlnlite.ground.network import Bool, Clauses, Float, Int32, Int64, Network, Tables
 from mlnlite.infer.conjunctions import Cells, Conjunctions, cells_of, split_wide
+from mlnlite.infer.propagate import propagate
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +19,7 @@ class Potentials:
 
     Attributes:
         cardinality: shape (n_variables,): the variables of the network, then auxiliary ones that the former determine.
-        cells: at most one for each arity, arity rising.
+        cells: at most one for each arity, arity rising; what hard formulas force is drawn (see `propagate`).
         constant: log-weight that every world has, the groundings that evidence decides included; minus infinity if no
             world is possible.
     """
@@ -55,7 +56,7 @@ def potentials_of(network: Network, extra: Sequence[Conjunctions] = (), auxiliar
     for row in narrow:
         add_cells, gain = cells_of(row, cardinality)
         cells, constant = [*cells, *add_cells], constant + gain
-    return Potentials(cardinality, _by_arity(cells), constant)
+    return Potentials(cardinality, *propagate(cells, cardinality, constant))
 
 
 def check_weights(network: Network) -> None:
@@ -85,16 +86,6 @@ def decided_false(network: Network) -> Int64:
     for block in blocks:
         np.add.at(possible, block.weight, block.count)
     return np.flatnonzero(np.isposinf(network.weights) & (possible < network.n_groundings))
-
-
-def _by_arity(cells: Sequence[Cells]) -> tuple[Cells, ...]:
-    """Cells of equal arity joined."""
-    joined = []
-    for k in sorted({c.scope.shape[1] for c in cells}):
-        same = [c for c in cells if c.scope.shape[1] == k]
-        fields = zip(*((c.scope, c.value, c.amount) for c in same), strict=True)
-        joined.append(Cells(*(np.concatenate(f) for f in fields)))
-    return tuple(joined)
 
 
 def literals_of(network: Network, atoms: Int32, true: Bool, amount: Float) -> Conjunctions:
