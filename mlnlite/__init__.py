@@ -9,6 +9,8 @@
 
 from __future__ import annotations
 
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from mlnlite.errors import Contradiction as Contradiction
@@ -70,6 +72,18 @@ _HOMES = {
     "Marginals": "mlnlite.results",
 }
 """Where the public names live. They are imported when first used, so that `mlnlite --help` does not load NumPy."""
+
+
+class _Package(ModuleType):
+    """This package. `ground` and `learn` are functions of it and also folders; the functions win."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Sets an attribute, but not a folder in place of the function of its name."""
+        if not (name in _HOMES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> object:

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from mlnlite.engines.plan import Plan, Relation, Tables, columns_of
-from mlnlite.engines.sql import select
+from mlnlite.engines.plan import Plan, Relation, Run, Tables, columns_of
+from mlnlite.engines.sql import quoted, select
 
 
 class DuckDBEngine:
     """Runs plans as SQL in an in-memory database of its own."""
 
-    def run(self, plan: Plan, tables: Tables) -> Relation:
-        """All rows of a plan in rising order of its columns."""
+    def load(self, tables: Tables) -> Run:
+        """What runs plans over these tables, which are copied into the database (it wants their statistics)."""
         import duckdb  # late: most commands do without
 
-        with duckdb.connect() as connection:
-            for name, columns in tables.items():
-                connection.register(name, {f"c{i}": column for i, column in enumerate(columns)})
+        connection = duckdb.connect()
+        for name, columns in tables.items():
+            connection.register("given", {f"c{i}": column for i, column in enumerate(columns)})
+            connection.execute(f"CREATE TABLE {quoted(name)} AS SELECT * FROM given")
+            connection.unregister("given")
+
+        def run(plan: Plan) -> Relation:
             result = connection.execute(select(plan)).fetchnumpy()
-        return {name: np.asarray(result[name], np.int64) for name in columns_of(plan)}
+            return {name: np.asarray(result[name], np.int64) for name in columns_of(plan)}
+
+        return run

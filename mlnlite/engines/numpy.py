@@ -17,6 +17,7 @@ from mlnlite.engines.plan import (
     Plan,
     Project,
     Relation,
+    Run,
     Scan,
     Tables,
     Union,
@@ -30,14 +31,17 @@ Int64 = NDArray[np.int64]
 class NumpyEngine:
     """Runs plans on NumPy arrays."""
 
-    def run(self, plan: Plan, tables: Tables) -> Relation:
-        """All rows of a plan in rising order of its columns."""
-        rows = _run(plan, tables)
-        columns = columns_of(plan)
-        if not columns:
-            return {}
-        order = np.lexsort([rows[c] for c in reversed(columns)])
-        return {c: rows[c][order].astype(np.int64, copy=False) for c in columns}
+    def load(self, tables: Tables) -> Run:
+        """What runs plans over these tables."""
+        return lambda plan: _sorted(plan, _run(plan, tables))
+
+
+def _sorted(plan: Plan, rows: dict[str, Int64]) -> Relation:
+    columns = columns_of(plan)
+    if not columns:
+        return {}
+    order = np.lexsort([rows[c] for c in reversed(columns)])
+    return {c: rows[c][order].astype(np.int64, copy=False) for c in columns}
 
 
 def _run(plan: Plan, tables: Tables) -> dict[str, Int64]:

@@ -5,7 +5,7 @@ Rows are bindings of named columns. Two columns of one name in a join are equal.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias
 
@@ -136,9 +136,13 @@ def columns_of(plan: Plan) -> tuple[str, ...]:
             return (*by, "count")
 
 
-class Engine(Protocol):
-    """Runs plans. The rows come in rising order of the asked columns."""
+Run: TypeAlias = Callable[[Plan], Relation]
+"""Gives all rows of a plan as columns of int64, in rising order of the columns."""
 
-    def run(self, plan: Plan, tables: Tables) -> Relation:
-        """All rows of a plan, as columns of int64."""
+
+class Engine(Protocol):
+    """Runs plans."""
+
+    def load(self, tables: Tables) -> Run:
+        """What runs plans over these tables."""
         ...

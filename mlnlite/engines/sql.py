@@ -27,7 +27,7 @@ def select(plan: Plan) -> str:
     'SELECT c0 AS "x" FROM "friends" WHERE c1 = 3 ORDER BY "x"'
     """
     columns = columns_of(plan)
-    order = f" ORDER BY {', '.join(map(_quoted, columns))}" if columns else ""
+    order = f" ORDER BY {', '.join(map(quoted, columns))}" if columns else ""
     return query(plan) + order
 
 
@@ -47,8 +47,8 @@ def query(plan: Plan) -> str:
             sign = "=" if operator == "=" else "<>"
             return f"SELECT * FROM {_sub(source, 'l')} WHERE {_side(left_side)} {sign} {_side(right_side)}"
         case Compute(source, name, terms, constant):
-            sum_ = " + ".join([str(constant), *(f"CAST({_quoted(c)} AS BIGINT) * {f}" for c, f in terms)])
-            return f"SELECT {_listed(columns_of(source), f'{sum_} AS {_quoted(name)}')} FROM {_sub(source, 'l')}"
+            sum_ = " + ".join([str(constant), *(f"CAST({quoted(c)} AS BIGINT) * {f}" for c, f in terms)])
+            return f"SELECT {_listed(columns_of(source), f'{sum_} AS {quoted(name)}')} FROM {_sub(source, 'l')}"
         case Lookup():
             return _lookup(plan)
         case Project(source, kept):
@@ -57,13 +57,14 @@ def query(plan: Plan) -> str:
             columns = _listed(columns_of(plan))
             return " UNION ".join(f"SELECT {columns} FROM {_sub(s, 'l')}" for s in sources)
         case Count(source, by):
-            group = f" GROUP BY {', '.join(map(_quoted, by))}" if by else ""
-            return f'SELECT {"".join(_quoted(c) + ", " for c in by)}COUNT(*) AS "count" FROM {_sub(source, "l")}{group}'
+            group = f" GROUP BY {', '.join(map(quoted, by))}" if by else ""
+            return f'SELECT {"".join(quoted(c) + ", " for c in by)}COUNT(*) AS "count" FROM {_sub(source, "l")}{group}'
         case _:
             assert_never(plan)
 
 
-def _quoted(name: str) -> str:
+def quoted(name: str) -> str:
+    """A name as SQL writes it."""
     return '"' + name.replace('"', '""') + '"'
 
 
@@ -72,15 +73,15 @@ def _sub(plan: Plan, alias: str) -> str:
 
 
 def _side(side: str | int) -> str:
-    return _quoted(side) if isinstance(side, str) else str(side)
+    return quoted(side) if isinstance(side, str) else str(side)
 
 
 def _listed(columns: tuple[str, ...], *more: str) -> str:
-    return ", ".join([*map(_quoted, columns), *more]) or '1 AS "_"'
+    return ", ".join([*map(quoted, columns), *more]) or '1 AS "_"'
 
 
 def _on(shared: list[str]) -> str:
-    return " WHERE " + " AND ".join(f"l.{_quoted(c)} = r.{_quoted(c)}" for c in shared) if shared else ""
+    return " WHERE " + " AND ".join(f"l.{quoted(c)} = r.{quoted(c)}" for c in shared) if shared else ""
 
 
 def _scan(plan: Scan) -> str:
@@ -93,22 +94,22 @@ def _scan(plan: Scan) -> str:
             conditions.append(f"c{i} = c{first[column]}")
         elif isinstance(column, str):
             first[column] = i
-    columns = ", ".join(f"c{i} AS {_quoted(c)}" for c, i in first.items()) or '1 AS "_"'
+    columns = ", ".join(f"c{i} AS {quoted(c)}" for c, i in first.items()) or '1 AS "_"'
     where = f" WHERE {' AND '.join(conditions)}" if conditions else ""
-    return f"SELECT {columns} FROM {_quoted(plan.table)}{where}"
+    return f"SELECT {columns} FROM {quoted(plan.table)}{where}"
 
 
 def _join(plan: Join) -> str:
     left, right = columns_of(plan.left), columns_of(plan.right)
-    columns = [f"l.{_quoted(c)}" for c in left] + [f"r.{_quoted(c)}" for c in right if c not in left]
+    columns = [f"l.{quoted(c)}" for c in left] + [f"r.{quoted(c)}" for c in right if c not in left]
     chosen = ", ".join(columns) or '1 AS "_"'
     return f"SELECT {chosen} FROM {_sub(plan.left, 'l')}, {_sub(plan.right, 'r')}{_on([c for c in right if c in left])}"
 
 
 def _lookup(plan: Lookup) -> str:
     on = " AND ".join(
-        f"t.c{i} = {'l.' + _quoted(k) if isinstance(k, str) else k}" for i, k in enumerate(plan.key)
+        f"t.c{i} = {'l.' + quoted(k) if isinstance(k, str) else k}" for i, k in enumerate(plan.key)
     )
-    value = f"COALESCE(t.c{len(plan.key)}, {_side(plan.default)}) AS {_quoted(plan.name)}"
-    columns = ", ".join([*(f"l.{_quoted(c)}" for c in columns_of(plan.source)), value])
-    return f"SELECT {columns} FROM {_sub(plan.source, 'l')} LEFT JOIN {_quoted(plan.table)} AS t ON {on or 'TRUE'}"
+    value = f"COALESCE(t.c{len(plan.key)}, {_side(plan.default)}) AS {quoted(plan.name)}"
+    columns = ", ".join([*(f"l.{quoted(c)}" for c in columns_of(plan.source)), value])
+    return f"SELECT {columns} FROM {_sub(plan.source, 'l')} LEFT JOIN {quoted(plan.table)} AS t ON {on or 'TRUE'}"

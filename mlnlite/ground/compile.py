@@ -42,6 +42,11 @@ class Source:
     n_rows: int
     world: str | None = None
 
+    @property
+    def tabled(self) -> bool:
+        """Whether plans have a column `row`; otherwise there is one row."""
+        return bool(self.keys) or self.n_rows != 1
+
     def columns(self, schema: AtomSchema) -> tuple[str | int | None, ...]:
         """How a scan of a table of the atom's predicate binds its columns."""
         return (self.world, *map(side, schema.arguments))
@@ -115,7 +120,7 @@ def _parts(source: Source, cube: Cube) -> tuple[list[tuple[Plan, set[int], int]]
     """Generators (plan, variables, size) and filters of a cube."""
     generators: list[tuple[Plan, set[int], int]] = []
     filters: list[_Filter] = []
-    if source.keys:
+    if source.tabled:
         rows = Scan(source.rows, (*map(column, source.keys), "row"))
         generators.append((rows, set(source.keys), source.n_rows))
     for proposition, truth in cube.items():
@@ -233,7 +238,7 @@ def compiled(source: Source, cubes: Sequence[Cube], equalities: Sequence[Equal])
         plan = bindings(source, cubes[0], free)
         known = {p: t for p, t in cubes[0].items() if isinstance(p, Equal) or _decided(source, p)}
     else:
-        columns = (*map(column, free), *(("row",) if source.keys else ()))
+        columns = (*map(column, free), *(("row",) if source.tabled else ()))
         plan = Union(tuple(Project(bindings(source, cube, free), columns) for cube in cubes))
     atoms = tuple(i for i in range(len(source.formula.atoms)) if AtomRef(i) not in known)
     for i in atoms:
@@ -241,7 +246,7 @@ def compiled(source: Source, cubes: Sequence[Cube], equalities: Sequence[Equal])
     open_equalities = tuple(e for e in equalities if e not in known)
     for i, equality in enumerate(open_equalities):
         plan = _with_equality(plan, i, equality)
-    kept = [*(["row"] if source.keys else []), *map(atom_column, atoms)]
+    kept = [*(["row"] if source.tabled else []), *map(atom_column, atoms)]
     kept += [equality_column(i) for i in range(len(open_equalities))]
     seen = set(source.keys).union(*(variables_of(source.formula.atoms[i].arguments) for i in atoms))
     counted = not set(free) <= seen or not _always_open(source, atoms)

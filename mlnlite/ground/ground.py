@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.choose import engine_for
-from mlnlite.engines.plan import Column, Engine, Relation, Tables
+from mlnlite.engines.plan import Column, Engine, Relation, Run
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
 from mlnlite.ground.assemble import Part, Piece, network_of
 from mlnlite.ground.compile import Compiled, Source, atom_column, compiled
@@ -47,8 +47,8 @@ def ground(model: Model, evidence: Evidence, *, query: Int64 | None = None, engi
     evidence = completed(evidence)
     model = replace(model, templates=tuple(t.expanded(evidence.types) for t in model.templates))
     tables = {**tables_of(evidence), **row_tables(model)}
-    engine = engine or engine_for(tables)
-    parts = [_grounded(source_of(i, t, evidence), t, tables, engine) for i, t in enumerate(model.templates)]
+    run = (engine or engine_for(tables)).load(tables)
+    parts = [_grounded(source_of(i, t, evidence), t, run) for i, t in enumerate(model.templates)]
     return network_of(model, evidence, parts, query)
 
 
@@ -77,24 +77,36 @@ def source_of(index: int, template: Template, evidence: Evidence, world: str | N
     return Source(formula, evidence, template.keys, f"rows:{index}", len(template.rows), world)
 
 
-def _grounded(source: Source, template: Template, tables: Tables, engine: Engine) -> Part:
+def _grounded(source: Source, template: Template, run: Run) -> Part:
     body = source.formula.body
     false, true = cubes(body, False), cubes(body, True)
     lists_true = len(true) < len(false)
+    if not (false and true):
+        return _constant(source, template, truth=bool(true))
     plan = compiled(source, true if lists_true else false, tuple(dict.fromkeys(_equalities(body))))
-    rows = engine.run(plan.plan, tables)
+    rows = run(plan.plan)
     try:
         groups = groups_of(source.formula, plan, rows)
     except LimitReached as error:
         cause = error.diagnostics[0]
         message = f"{template.name} cannot be grounded: {cause.message}"
         raise LimitReached([Diagnostic("E402", message, template.span, cause.hint)]) from error
-    part = _part(source, plan, rows, groups, lists_true=lists_true)
+    return _verified(template, _part(source, plan, rows, groups, lists_true=lists_true))
+
+
+def _verified(template: Template, part: Part) -> Part:
     if template.hard and (part.decided_false > 0).any():
         hint = "one of the two is wrong: change the facts, or give the formula a weight"
         message = f"the evidence makes {template.name} false, which is hard: {template.text}"
         raise Contradiction([Diagnostic("E403", message, template.span, hint)])
     return part
+
+
+def _constant(source: Source, template: Template, *, truth: bool) -> Part:
+    """A formula that is always true, or never."""
+    every = np.full(source.n_rows, _groundings_of_a_row(source), np.int64)
+    none = np.zeros_like(every)
+    return _verified(template, Part((), every, none) if truth else Part((), none, every))
 
 
 def _equalities(expression: Expression) -> Iterator[Equal]:
@@ -114,7 +126,7 @@ def _equalities(expression: Expression) -> Iterator[Equal]:
 def _part(source: Source, plan: Compiled, rows: Relation, groups: list[Group], *, lists_true: bool) -> Part:
     """The pieces of a template, and how many groundings of each of its rows evidence decides."""
     n_rows = len(next(iter(rows.values()))) if rows else 1
-    row = rows["row"] if source.keys else np.zeros(n_rows, np.int64)
+    row = rows["row"] if source.tabled else np.zeros(n_rows, np.int64)
     count = rows["count"] if plan.counted else np.ones(n_rows, np.int64)
     total = np.full(source.n_rows, _groundings_of_a_row(source), np.int64)
     listed = {True: np.zeros(source.n_rows, np.int64), False: np.zeros(source.n_rows, np.int64)}

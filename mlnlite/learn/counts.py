@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite.engines.plan import Count, Engine, Plan, Tables
+from mlnlite.engines.plan import Count, Plan, Run
 from mlnlite.ground.compile import Source, bindings, with_number
 from mlnlite.ground.ground import source_of
 from mlnlite.learn.separate import Case, cases
@@ -40,15 +40,14 @@ class Entries:
 
 
 def entries(
-    templates: Sequence[Template], evidence: Evidence, tables: Tables, engine: Engine, targets: frozenset[str]
+    templates: Sequence[Template], evidence: Evidence, run: Run, targets: frozenset[str]
 ) -> dict[str, Entries]:
     """The entries of all templates for the atoms of each target predicate.
 
     Args:
         templates: expanded.
         evidence: complete: every atom that is not a fact is false.
-        tables: of the evidence and the templates' rows.
-        engine: runs the joins.
+        run: runs plans over the tables of the evidence and the templates' rows.
         targets: predicates whose atoms are counted for.
     """
     found: dict[str, list[Entries]] = {name: [] for name in targets}
@@ -58,7 +57,7 @@ def entries(
         for sign, case in _cases(source):
             for target, (schema, _) in enumerate(case.literals):
                 if schema.predicate in targets:
-                    found[schema.predicate] += _counted(source, case, target, sign, first, (tables, engine))
+                    found[schema.predicate] += _counted(source, case, target, sign, first, run)
         first += len(template.weights)
     return {name: _joined(parts) for name, parts in found.items()}
 
@@ -73,7 +72,7 @@ def _cases(source: Source) -> Iterator[tuple[int, Case]]:
 
 
 def _counted(
-    source: Source, case: Case, target: int, sign: int, first: int, run: tuple[Tables, Engine]
+    source: Source, case: Case, target: int, sign: int, first: int, run: Run
 ) -> list[Entries]:
     schema, truth = case.literals[target]
     predicate = source.evidence.predicates[schema.predicate]
@@ -81,9 +80,8 @@ def _counted(
     if others is None:
         return []
     plan = _plan(source, case, others, schema)
-    tables, engine = run
-    rows = engine.run(plan, tables)
-    weight = rows["row"] + first if source.keys else np.full(len(rows["count"]), first, np.int64)
+    rows = run(plan)
+    weight = rows["row"] + first if source.tabled else np.full(len(rows["count"]), first, np.int64)
     change = rows["count"] * (sign if truth else -sign)
     return [Entries(rows["database"], rows["atom"], weight, change)]
 
@@ -118,7 +116,7 @@ def _plan(source: Source, case: Case, others: list[tuple[AtomSchema, bool]], tar
     cube |= {Equal(variable, by): True for variable, by in case.same}
     plan = bindings(replace(source, formula=formula), cube, source.formula.free)
     plan = with_number(plan, source.evidence, target, "atom")
-    by = ("database", *(("row",) if source.keys else ()), "atom")
+    by = ("database", *(("row",) if source.tabled else ()), "atom")
     return Count(plan, by)
 
 

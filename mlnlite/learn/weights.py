@@ -94,7 +94,7 @@ def _targets(model: Model, predict: Iterable[str] | None) -> frozenset[str]:
 def _choices(model: Model, databases: Evidence, targets: frozenset[str], engine: Engine | None) -> Choices:
     evidence = closed(databases, databases.predicates)
     tables = {**tables_of(evidence), **row_tables(model)}
-    found = entries(model.templates, evidence, tables, engine or engine_for(tables), targets)
+    found = entries(model.templates, evidence, (engine or engine_for(tables)).load(tables), targets)
     return choices(found, evidence, sum(len(t.weights) for t in model.templates))
 
 

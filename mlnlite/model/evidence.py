@@ -39,7 +39,8 @@ class Evidence:
         predicates: as in the model, with the closed worlds that were asked for.
         facts: by predicate name; predicates without a fact have an empty table.
         present: by type name, shape (n_databases, n_constants): which constants each database has: those of the model,
-            those that its file declares, and those it mentions.
+            those that its file declares, and those it mentions. A type with a weight for each constant (`+x`) has the
+            same constants in all databases.
         n_databases: how many.
         names: where each database is from.
         warnings: what reading found strange.

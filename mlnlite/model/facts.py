@@ -215,9 +215,11 @@ def _present(
     model: Model, types: Mapping[str, Type], facts: Mapping[str, Facts], n_databases: int, reading: _Reading
 ) -> dict[str, NDArray[np.bool_]]:
     present = {}
+    with_weights = {t.formula.variables[k].type for t in model.templates for k in t.keys}
     for name, t in types.items():
+        shared = len(t.constants) if name in with_weights else len(model.types[name].constants)
         present[name] = np.zeros((n_databases, len(t.constants)), np.bool_)
-        present[name][:, : len(model.types[name].constants)] = True
+        present[name][:, :shared] = True
     for start, stop, name, ids in reading.declared:
         present[name][start:stop, ids] = True
     for predicate in model.predicates.values():

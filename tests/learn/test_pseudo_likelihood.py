@@ -1,0 +1,78 @@
+"""Pseudo-likelihood equals its definition, its gradient finite differences, and known weights come out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import mlnlite as ml
+from mlnlite.engines.duckdb import DuckDBEngine
+from mlnlite.engines.numpy import NumpyEngine
+from mlnlite.learn import likelihood
+from mlnlite.learn.weights import _choices
+from tests import brute
+from tests.models import evidence_texts, model_texts
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+
+
+def with_weights(model, evidence, weights):
+    templates = [t.expanded(evidence.types) for t in model.templates]
+    parts = np.split(weights, np.cumsum([len(t.weights) for t in templates])[:-1])
+    return replace(model, templates=tuple(replace(t, weights=w) for t, w in zip(templates, parts, strict=True)))
+
+
+def choices_of(text, databases, engine=None):
+    model = ml.model_from_text(text)
+    evidence = ml.evidence_from_text("\n---\n".join(databases), model=model)
+    expanded = replace(model, templates=tuple(t.expanded(evidence.types) for t in model.templates))
+    found = _choices(expanded, evidence, frozenset(model.predicates), engine or NumpyEngine())
+    return expanded, evidence, found
+
+
+@settings(max_examples=100, deadline=None)
+@given(model_texts(hard=False), evidence_texts(complete=True), evidence_texts(complete=True))
+def test_value_and_gradient(text, first, second):
+    model, evidence, found = choices_of(text, [first, second])
+    n = sum(len(t.weights) for t in model.templates)
+    weights = np.random.default_rng(0).normal(size=n)
+    point = likelihood.at(found, weights)
+    assert point.value == pytest.approx(
+        brute.pseudo_log_likelihood(with_weights(model, evidence, weights), evidence), abs=1e-9
+    )
+    step = 1e-6
+    for i in range(n):
+        shift = step * np.eye(n)[i]
+        slope = (likelihood.at(found, weights + shift).value - likelihood.at(found, weights - shift).value) / 2 / step
+        assert point.gradient[i] == pytest.approx(slope, abs=1e-5)
+        bend = (likelihood.at(found, weights + shift).gradient - likelihood.at(found, weights - shift).gradient) / -2
+        assert likelihood.curvature(found, point, np.eye(n)[i]) == pytest.approx(bend / step, abs=1e-5)
+
+
+@settings(max_examples=40, deadline=None)
+@given(model_texts(hard=False), evidence_texts(complete=True))
+def test_engines_agree(text, facts):
+    values = []
+    for engine in (NumpyEngine(), DuckDBEngine()):
+        model, _, found = choices_of(text, [facts], engine)
+        values.append(likelihood.at(found, np.linspace(-1, 1, sum(len(t.weights) for t in model.templates))).value)
+    assert values[0] == pytest.approx(values[1], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("prior_sd", "expected"),
+    [(None, (0.646696, 1.519900)), (5.0, (0.628576, 1.508115)), (1.0, (0.380768, 1.291365))],
+)
+def test_smokers(prior_sd, expected):
+    folder = DATA / "pracmln" / "smokers"
+    if not folder.exists():
+        pytest.skip("needs the shared data")
+    model = ml.read_model(folder / "mlns" / "smoking.mln")
+    data = ml.read_evidence(folder / "dbs" / "smoking-train.db", model=model)
+    learned = ml.learn(model, data, prior_sd=prior_sd)
+    assert learned.weights == pytest.approx(expected, abs=1e-5)
+    assert learned.status == "converged"
