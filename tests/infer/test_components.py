@@ -1,0 +1,30 @@
+"""Components of networks."""
+
+import networkx as nx
+import numpy as np
+from hypothesis import given, settings
+
+from mlnlite.infer.components import components_of
+from tests.networks import network, networks
+
+
+@settings(max_examples=100, deadline=None)
+@given(net=networks())
+def test_components_are_those_of_the_graph(net):
+    graph = nx.Graph()
+    graph.add_nodes_from(range(net.n_variables))
+    scopes = [net.variable[np.abs(c.literals) - 1] for c in net.clauses] + [net.variable[t.atoms] for t in net.tables]
+    for scope in scopes:
+        for row in scope.tolist():
+            nx.add_path(graph, row)
+    found = components_of(net)
+    assert [c.variables.tolist() for c in found] == sorted(map(sorted, nx.connected_components(graph)))
+    for b, scope in enumerate(scopes):
+        rows = [(c.clauses + c.tables)[b] for c in found]
+        assert sorted(np.concatenate(rows).tolist()) == list(range(len(scope)))
+        for component, own in zip(found, rows, strict=True):
+            assert np.isin(scope[own], component.variables).all()
+
+
+def test_variables_without_factors_are_components():
+    assert [c.variables.tolist() for c in components_of(network([("", 1), ("!", 3)]))] == [[0], [1]]
