@@ -1,0 +1,110 @@
+"""Cost fields: a scene and a robot grasp in, the costs of every voxel and orientation out, and what they rule out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.domains.handover.chain import reach_bound
+from mlnlite.domains.handover.costs import Distance, Distances, Limits, Points, distances, reachability, safety
+from mlnlite.domains.handover.grasps import GraspSet
+from mlnlite.domains.handover.objects import HandoverObject, region_centre, region_points
+from mlnlite.domains.handover.pose import FloatArray
+from mlnlite.domains.handover.scene import Scene
+from mlnlite.domains.handover.voxels import presenting_rotations, voxel_centres
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What is optimised, and how far.
+
+    Attributes:
+        orientations: of the object per voxel.
+        distance: `point` as printed in the paper, or `surface`.
+        limits: thresholds of the costs [m].
+        grasps: how many of the best grasps to try, in order, until one has a feasible voxel.
+        approaches: how many approach directions of a grasp to try per pose, best aligned with the arm first.
+        collisions: whether robot, body and object must stay apart.
+        receiver: whether the receiver's arm must reach the object at its level of mobility.
+        ik_calls: after so many calls of the inverse kinematics the search stops with a bound.
+    """
+
+    orientations: int = 8
+    distance: Distance = "point"
+    limits: Limits = Limits()
+    grasps: int = 6
+    approaches: int = 4
+    collisions: bool = True
+    receiver: bool = True
+    ik_calls: int = 4000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CostField:
+    """Costs of one grasp over the map; V voxels, K orientations.
+
+    Attributes:
+        grasp: index of the grasp.
+        centres: shape (V, 3) [m].
+        rotations: of the object, shape (V, K, 3, 3).
+        parts: the distances that the costs are made of, each (V, K) [m].
+        safety: C_S, shape (V, K) [m]; 0 where forbidden.
+        reach: C_R, shape (V, K) [m]; infinite where forbidden.
+        excess: how far the nearest approach lies outside the reach bound, shape (V, K) [m]; negative inside.
+    """
+
+    grasp: int
+    centres: FloatArray
+    rotations: FloatArray
+    parts: Distances
+    safety: FloatArray
+    reach: FloatArray
+    excess: FloatArray
+
+    @property
+    def allowed(self) -> NDArray[np.bool_]:
+        """What the costs and the arm's reach bound leave, shape (V, K)."""
+        return np.asarray((self.safety > 0) & np.isfinite(self.reach) & (self.excess <= 1e-3), dtype=np.bool_)
+
+
+def cost_field(scene: Scene, grasps: GraspSet, grasp: int, options: Options) -> CostField:
+    """The costs of equations 3 and 4 with grasp number `grasp`. C_R is rounded to 1e-9 m, so that ties are ties."""
+    centres = voxel_centres(scene.voxels)
+    towards = presented_direction(scene.thing, scene.region)
+    rotations = presenting_rotations(centres, scene.hand.position, towards, options.orientations)
+    points = cost_points(scene, grasps.centres[grasp])
+    parts = distances(points, centres, rotations, options.distance)
+    safe = safety(parts.to_hand, parts.to_face, parts.gripper_to_hand, options.limits.safety)
+    reach = reachability(np.round(parts.to_grasp, 9), options.limits.reach)
+    excess = _excess(scene, grasps, grasp, centres, rotations)
+    return CostField(grasp, centres, rotations, parts, np.round(safe, 9), reach, excess)
+
+
+def cost_points(scene: Scene, grasp: FloatArray) -> Points:
+    """The places that the costs of a scene compare, for a robot grasp centred at `grasp` (3,) [m] in the object."""
+    thing, region = scene.thing, scene.region
+    return Points(scene.hand.position, scene.face.position, grasp, region_points(thing, region),
+                  region_centre(thing, region), thing.surface.points)  # fmt: skip
+
+
+def presented_direction(thing: HandoverObject, region: int) -> FloatArray:
+    """Unit vector in the object, shape (3,), from its centre to the human region, or the region's mean normal if that is its centre."""
+    centre = region_centre(thing, region)
+    if np.linalg.norm(centre) < 0.005:
+        centre = thing.surface.normals[thing.surface.labels == region].mean(axis=0)
+    length = float(np.linalg.norm(centre))
+    return centre / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+
+
+def _excess(
+    scene: Scene, grasps: GraspSet, grasp: int, centres: FloatArray, rotations: FloatArray
+) -> FloatArray:
+    wrist, centre, radius = reach_bound(scene.robot.chain)
+    middle = scene.base.rotation @ centre + scene.base.position
+    frames = grasps.rotations[grasp][grasps.free[grasp]]
+    wrists = frames @ wrist + grasps.centres[grasp]
+    places = np.einsum("vkij,aj->vkai", rotations, wrists) + (centres - middle)[:, None, None]
+    distance: FloatArray = np.sqrt(np.einsum("vkai,vkai->vka", places, places)).min(axis=2) - radius
+    return distance

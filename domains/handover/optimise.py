@@ -1,0 +1,186 @@
+"""The hierarchical optimisation of Ardon et al. (2021), equation 1: a scene in, the proven best configuration out.
+
+    g_r* = argmax C_A(g_r)                                     the grasp first
+    Psi(m) = argmax C_S(Psi, g_r*)  s.t. inverse kinematics    per voxel m, the safest pose
+    m* = argmin C_R(Psi(m))                                    the voxel of least reach
+
+Best-first: voxels in order of `min_k C_R(m, k)`, a lower bound of what the solver may leave of them; when the bound of the next
+voxel is above the best found, no other voxel can win. Ties go to higher C_S, then to the lower index of the voxel.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite import Diagnostic, MlnError
+from mlnlite.domains.handover.advice import BLAMES, explain
+from mlnlite.domains.handover.costs import appropriateness
+from mlnlite.domains.handover.feasibility import Hold, attempt, human_grasp
+from mlnlite.domains.handover.fields import CostField, Options, cost_field
+from mlnlite.domains.handover.grasps import GraspSet, sample_grasps
+from mlnlite.domains.handover.objects import region_points
+from mlnlite.domains.handover.pose import FloatArray, Pose
+from mlnlite.domains.handover.scene import Scene
+
+Status = Literal["optimal", "infeasible", "limit"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Configuration:
+    """Where and how to hand the object over; lengths in [m], frame `world`.
+
+    Attributes:
+        method: `A`, `B` or `ours`.
+        thing: pose of the object.
+        human_grasp: where the receiver grasps it, shape (3,).
+        grasp: index of the robot's grasp in the grasp set; `rank` is its place by C_A, from 0.
+        rank: see `grasp`.
+        hold: approach, pose of the tool, configuration of the robot.
+        voxel: index in the map, and `orientation` that of the object, or -1 if the method has no map.
+        orientation: see `voxel`.
+        appropriateness: C_A.
+        safety: C_S.
+        reach: C_R.
+    """
+
+    method: str
+    thing: Pose
+    human_grasp: FloatArray
+    grasp: int
+    rank: int
+    hold: Hold
+    voxel: int
+    orientation: int
+    appropriateness: float
+    safety: float
+    reach: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Handover:
+    """Result of a method on a scene.
+
+    Attributes:
+        status: `optimal`: proven; `infeasible`: proven that there is none; `limit`: stopped at the limit of calls.
+        configuration: the best found, or None.
+        bound: no configuration with this grasp has a lower C_R [m].
+        ik_calls: of the inverse kinematics.
+        voxels: how many voxels were asked about.
+        refused: how many candidates each constraint ruled out.
+        advice: what stands in the way and what would help, if there is no configuration.
+    """
+
+    status: Status
+    configuration: Configuration | None
+    bound: float
+    ik_calls: int
+    voxels: int
+    refused: tuple[tuple[str, int], ...] = ()
+    advice: tuple[Diagnostic, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Case:
+    scene: Scene
+    grasps: GraspSet
+    options: Options
+    exhaustive: bool
+    refused: Counter[str]
+
+
+_Best = tuple[float, float, int, int, Hold]
+
+
+def optimise(scene: Scene, options: Options | None = None, *, exhaustive: bool = False) -> Handover:
+    """The best configuration of a scene.
+
+    Args:
+        scene: who, what and where.
+        options: costs, constraints and limits.
+        exhaustive: ask about every voxel instead of best-first; same answer, thousands of calls.
+    """
+    options = options or Options()
+    grasps = sample_grasps(scene.thing, scene.robot.gripper)
+    case = _Case(scene, grasps, options, exhaustive, Counter())
+    ranked, values = rank_grasps(scene, grasps)
+    fields: list[CostField] = []
+    for rank, grasp in enumerate(ranked[: options.grasps]):
+        fields.append(cost_field(scene, grasps, int(grasp), options))
+        best, bound = _search(case, fields[-1])
+        stopped = best is None and np.isfinite(bound) or best is not None and bound < best[0]
+        if best is not None:
+            found = _configuration(case, fields[-1], best, rank, float(values[grasp]))
+            return _result(case, "limit" if stopped else "optimal", found, bound)
+        if stopped:
+            return _result(case, "limit", None, bound, explain(scene, fields, options, case.refused))
+    return _result(case, "infeasible", None, float("inf"), explain(scene, fields, options, case.refused))
+
+
+def rank_grasps(scene: Scene, grasps: GraspSet) -> tuple[NDArray[np.int64], FloatArray]:
+    """Grasps outside the human region by falling C_A, ties by index; and C_A of every grasp [m]."""
+    if not len(grasps.widths):
+        return np.empty(0, dtype=np.int64), np.empty(0)
+    values = np.round(appropriateness(grasps.centres, region_points(scene.thing, scene.region)), 9)
+    outside = np.flatnonzero((grasps.labels != scene.region).all(axis=1))
+    return outside[np.argsort(-values[outside], kind="stable")], values
+
+
+def _search(case: _Case, costs: CostField) -> tuple[_Best | None, float]:
+    """The best of a grasp, and a bound on C_R [m] that nothing with this grasp can beat."""
+    bounds = np.where(costs.allowed, costs.reach, np.inf).min(axis=1)
+    order = np.flatnonzero(np.isfinite(bounds))
+    order = order if case.exhaustive else order[np.argsort(bounds[order], kind="stable")]
+    best: _Best | None = None
+    for i, voxel in enumerate(order):
+        if not case.exhaustive and best is not None and bounds[voxel] > best[0]:
+            break
+        if case.refused["calls"] >= case.options.ik_calls:
+            return best, float(bounds[order[i:]].min())
+        found = _safest(case, costs, int(voxel))
+        best = min((b for b in (best, found) if b is not None), key=lambda b: b[:3], default=None)
+    return best, best[0] if best is not None else float("inf")
+
+
+def _safest(case: _Case, costs: CostField, voxel: int) -> _Best | None:
+    """The pose of highest C_S at a voxel that receiver and robot can serve."""
+    case.refused["voxels"] += 1
+    for k in np.argsort(-costs.safety[voxel], kind="stable"):
+        if not costs.allowed[voxel, k]:
+            continue
+        pose = Pose(costs.centres[voxel], costs.rotations[voxel, k])
+        outcome = attempt(case.scene, case.grasps, costs.grasp, pose, case.options)
+        case.refused["calls"] += outcome.calls
+        if outcome.hold is not None:
+            return float(costs.reach[voxel, k]), -float(costs.safety[voxel, k]), voxel, int(k), outcome.hold
+        case.refused[outcome.blame] += 1
+    return None
+
+
+def _configuration(case: _Case, costs: CostField, best: _Best, rank: int, value: float) -> Configuration:
+    reach, minus_safety, voxel, k, held = best
+    pose = Pose(costs.centres[voxel], costs.rotations[voxel, k])
+    return Configuration("ours", pose, human_grasp(case.scene, pose), costs.grasp, rank, held, voxel, k,
+                         value, -minus_safety, reach)  # fmt: skip
+
+
+def _result(
+    case: _Case, status: Status, found: Configuration | None, bound: float, advice: tuple[Diagnostic, ...] = ()
+) -> Handover:
+    refused = tuple((name, case.refused[name]) for name in BLAMES)
+    return Handover(status, found, bound, case.refused["calls"], case.refused["voxels"], refused, advice)
+
+
+def require(handover: Handover) -> Configuration:
+    """The configuration of a result.
+
+    Raises:
+        MlnError: there is none; says which constraint is in the way and the nearest relaxation.
+    """
+    if handover.configuration is None:
+        raise MlnError(handover.advice)
+    return handover.configuration
