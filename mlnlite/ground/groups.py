@@ -47,7 +47,7 @@ def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
     groups = []
     for index in _equal_rows(code):
         known, merged = _meaning({key: int(column[index[0]]) for key, column in features.items()})
-        body = simplified(_renamed(formula.body, merged), {**plan.known, **known})
+        body = simplified(renamed(formula.body, merged), {**plan.known, **known})
         groups.append(Group(index, shape_of(body)))
     return groups
 
@@ -92,7 +92,7 @@ def _meaning(
     return known, merged
 
 
-def _renamed(expression: Expression, merged: Mapping[int, int]) -> Expression:
+def renamed(expression: Expression, merged: Mapping[int, int]) -> Expression:
     """The expression with coinciding atoms made one."""
     if not merged:
         return expression
@@ -100,12 +100,12 @@ def _renamed(expression: Expression, merged: Mapping[int, int]) -> Expression:
         case AtomRef(index):
             return AtomRef(merged.get(index, index))
         case Not(operand):
-            return Not(_renamed(operand, merged))
+            return Not(renamed(operand, merged))
         case All(operands):
-            return All(tuple(_renamed(f, merged) for f in operands))
+            return All(tuple(renamed(f, merged) for f in operands))
         case Any(operands):
-            return Any(tuple(_renamed(f, merged) for f in operands))
+            return Any(tuple(renamed(f, merged) for f in operands))
         case Iff(left, right):
-            return Iff(_renamed(left, merged), _renamed(right, merged))
+            return Iff(renamed(left, merged), renamed(right, merged))
         case _:
             return expression

@@ -91,6 +91,24 @@ class Evidence:
             arguments.append(constant)
         return name, tuple(reversed(arguments))
 
+    def atom_texts(self, numbers: Int64) -> list[str]:
+        """Atoms as a user writes them, for rising atom numbers of shape (n,)."""
+        texts: list[str] = []
+        for name, low in self.first_atom().items():
+            sizes = self.sizes(name)
+            start, stop = np.searchsorted(numbers, [low, low + int(np.prod(sizes, dtype=object))])
+            rest = numbers[start:stop] - low
+            columns: list[list[str]] = []
+            for type_name, size in zip(reversed(self.predicates[name].types), reversed(sizes), strict=True):
+                rest, ids = np.divmod(rest, size)
+                constants = self.types[type_name].constants
+                columns.insert(0, [constants[i] for i in ids.tolist()])
+            if columns:
+                texts += [f"{name}({', '.join(row)})" for row in zip(*columns, strict=True)]
+            else:
+                texts += [name] * int(stop - start)
+        return texts
+
     def atom_text(self, number: int) -> str:
         """Atom `number` as a user writes it: `Friends(Anna, Bob)`."""
         name, arguments = self.atom_at(number)

@@ -12,7 +12,7 @@ from mlnlite.model.check import with_terms
 from mlnlite.model.model import Model
 from mlnlite.model.templates import Template
 from mlnlite.syntax import tree
-from mlnlite.syntax.write import write_model
+from mlnlite.syntax.write import write_formula, write_model
 
 
 def model_text(model: Model) -> str:
@@ -32,6 +32,18 @@ def program_of(model: Model) -> tree.Program:
     for template in model.templates:
         statements += _statements(template, model)
     return tree.Program(tuple(statements), model.dialect)
+
+
+def row_text(template: Template, model: Model, row: int) -> str:
+    """One formula of a template, as text: its row number `row`."""
+    assert template.rows is not None
+    holes: list[int] = []
+    formula = _Untyper(template, model, holes).formula()
+    constants = []
+    for key in holes:
+        type_name = template.formula.variables[template.keys[key]].type
+        constants.append(tree.Constant(model.types[type_name].constants[template.rows[row, key]]))
+    return write_formula(_filled(formula, lambda hole: constants[hole]), model.dialect)
 
 
 def _statements(template: Template, model: Model) -> Iterator[tree.Statement]:

@@ -1,0 +1,239 @@
+"""The entry functions `marginal` and `map_state`: model, evidence and question in, a result out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.engines.plan import Engine
+from mlnlite.errors import QueryMistake
+from mlnlite.ground.ground import ground
+from mlnlite.ground.groups import renamed
+from mlnlite.ground.network import Network
+from mlnlite.infer.formula import formula_probabilities
+from mlnlite.infer.map import Method, map_of
+from mlnlite.infer.marginal import WIDTH_LIMIT, marginals_of
+from mlnlite.infer.query import Question, atom_numbers, question_of
+from mlnlite.infer.score import counts
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.facts import closed
+from mlnlite.model.formulas import AtomRef, Expression
+from mlnlite.model.model import Model
+from mlnlite.model.propositional import Proposition, simplified
+from mlnlite.model.unparse import row_text
+from mlnlite.results import MapState, Marginals, Statistics, Violation
+
+Int64 = NDArray[np.int64]
+
+EVIDENCE = "evidence"
+
+
+def marginal(
+    model: Model,
+    evidence: Evidence,
+    query: str | Sequence[str] | None = None,
+    *,
+    closed_world: str | Iterable[str] = (),
+    width_limit: int = WIDTH_LIMIT,
+    engine: Engine | None = None,
+) -> Marginals:
+    """Probabilities of atoms and formulas given evidence.
+
+    Args:
+        model: a model with weights.
+        evidence: one database. What it does not say is unknown.
+        query: predicate names, atoms (with variables: all groundings), formulas; None for every atom that some
+            formula leaves open.
+        closed_world: predicates of which everything that is not a fact is false; "all" for all that the query does
+            not mention (but functional predicates `!` without a known value stay open).
+        width_limit: largest number of entries of a table in exact inference.
+        engine: what runs the grounding plans; by default chosen by size.
+
+    Raises:
+        QueryMistake: if the query, or a closed world, does not fit the model.
+        Contradiction: if no world satisfies the evidence and the hard formulas.
+        LimitReached: if an exact answer would need more than the limit.
+    """
+    asked = _ask(model, evidence, query, closed_world, engine)
+    network, question = asked.network, asked.question
+    index, truth = _locate(network, question.atoms)
+    start = perf_counter()
+    unknown = index >= 0
+    every = len(np.unique(index[unknown])) == network.n_atoms
+    found = marginals_of(network, None if every else np.unique(index[unknown]), width_limit=width_limit)
+    probability = truth.astype(float)
+    probability[unknown] = found.probability[index[unknown]]
+    methods = [found.method[i] if i >= 0 else EVIDENCE for i in index.tolist()]
+    names = _texts(network.evidence, question.atoms)
+    if question.formulas:
+        expressions = [_over_network(f.expression, network) for f in question.formulas]
+        of_formulas = formula_probabilities(network, expressions, width_limit=width_limit)
+        probability = np.concatenate([probability, of_formulas])
+        names += [f.text for f in question.formulas]
+        methods += ["elimination"] * len(expressions)
+    seconds = {"ground": asked.seconds, "infer": perf_counter() - start}
+    return Marginals(
+        names=tuple(names),
+        probabilities=probability,
+        methods=tuple(methods),
+        exact=np.ones(len(names), bool),
+        error=np.zeros(len(names)),
+        status="exact",
+        log_z=found.log_z,
+        statistics=Statistics(network.n_atoms, network.n_factors, found.n_components, found.largest_table, seconds),
+        block=_blocks(network, index, len(names)),
+    )
+
+
+def map_state(
+    model: Model,
+    evidence: Evidence,
+    query: str | Sequence[str] | None = None,
+    *,
+    closed_world: str | Iterable[str] = (),
+    method: Method = "auto",
+    time_limit: float | None = None,
+    seed: int = 0,
+    engine: Engine | None = None,
+) -> MapState:
+    """A most probable world given evidence, with a bound that proves it or says how much better another could be.
+
+    Args:
+        model: a model with weights.
+        evidence: one database. What it does not say is unknown.
+        query: which atoms to show (the world is most probable as a whole); None for all that are open.
+        closed_world: as in `marginal`.
+        method: "auto", "ve" (elimination) or "wcsp" (toulbar2).
+        time_limit: [s] for the search.
+        seed: of the search.
+        engine: what runs the grounding plans; by default chosen by size.
+
+    Raises:
+        QueryMistake: if the query, or a closed world, does not fit the model.
+        Contradiction: if no world satisfies the evidence and the hard formulas.
+        LimitReached: if there is no answer within the limits.
+    """
+    asked = _ask(model, evidence, query, closed_world, engine)
+    network, question = asked.network, asked.question
+    if question.formulas:
+        hint = "ask for atoms or predicates; the probability of a formula is a question for `marginal`"
+        raise QueryMistake(f"the most probable world has atoms, not formulas: {question.formulas[0].text}", hint)
+    start = perf_counter()
+    best = map_of(network, method=method, time_limit=time_limit, seed=seed)
+    index, truth = _locate(network, question.atoms)
+    truth[index >= 0] = best.truth[index[index >= 0]]
+    methods = [best.component_method[best.component[i]] if i >= 0 else EVIDENCE for i in index.tolist()]
+    seconds = {"ground": asked.seconds, "infer": perf_counter() - start}
+    return MapState(
+        names=tuple(_texts(network.evidence, question.atoms)),
+        truth=truth,
+        methods=tuple(methods),
+        log_weight=best.log_weight,
+        bound=best.bound,
+        status=best.status,
+        violated=tuple(_violations(network, best.truth)),
+        statistics=Statistics(
+            network.n_atoms, network.n_factors, len(best.component_status), best.largest_table, seconds
+        ),
+        block=_blocks(network, index, len(index)),
+    )
+
+
+# --- from the question to the network and back
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    question: Question
+    network: Network
+    seconds: float
+
+
+def _ask(
+    model: Model,
+    evidence: Evidence,
+    query: str | Sequence[str] | None,
+    closed_world: str | Iterable[str],
+    engine: Engine | None,
+) -> _Asked:
+    start = perf_counter()
+    if query is None:
+        network = ground(model, _closed(evidence, closed_world, frozenset()), engine=engine)
+        return _Asked(Question(network.atoms, (), frozenset()), network, perf_counter() - start)
+    question = question_of(query, model, evidence)
+    network = ground(
+        model, _closed(evidence, closed_world, question.predicates), query=question.all_atoms, engine=engine
+    )
+    return _Asked(question, network, perf_counter() - start)
+
+
+def _closed(evidence: Evidence, closed_world: str | Iterable[str], asked: frozenset[str]) -> Evidence:
+    if closed_world == "all":
+        return closed(evidence, [n for n, p in evidence.predicates.items() if n not in asked and p.marker != "!"])
+    names = [closed_world] if isinstance(closed_world, str) else list(closed_world)
+    for name in names:
+        predicate = evidence.predicates.get(name)
+        if predicate is not None and predicate.marker == "!":
+            hint = f"give its value as a fact, or leave {name} open"
+            raise QueryMistake(f"{predicate} always has a true value, so its world cannot be closed", hint)
+    return closed(evidence, names) if names else evidence
+
+
+def _locate(network: Network, numbers: Int64) -> tuple[Int64, NDArray[np.bool_]]:
+    """Index of each atom in the network, -1 for known ones; and their truth."""
+    index = np.searchsorted(network.atoms, numbers)
+    inside = np.minimum(index, max(network.n_atoms - 1, 0))
+    unknown = network.atoms[inside] == numbers if network.n_atoms else np.zeros(len(numbers), bool)
+    truth = np.zeros(len(numbers), bool)
+    for name, facts in network.evidence.facts.items():
+        true = network.evidence.atom_number(name, facts.arguments[facts.truth])
+        truth |= np.isin(numbers, true)
+    return np.where(unknown, index, -1), truth
+
+
+def _texts(evidence: Evidence, numbers: Int64) -> list[str]:
+    order = np.argsort(numbers, kind="stable")
+    texts = np.empty(len(numbers), object)
+    texts[order] = evidence.atom_texts(numbers[order])
+    return [str(t) for t in texts]
+
+
+def _blocks(network: Network, index: Int64, n_rows: int) -> Int64:
+    """Variable of each row that is an atom of a block, else -1."""
+    block = np.full(n_rows, -1, np.int64)
+    rows = np.flatnonzero(index >= 0)
+    variable = network.variable[index[rows]]
+    block[rows] = np.where(network.block[variable], variable, -1)
+    return block
+
+
+def _over_network(expression: Expression, network: Network) -> Expression:
+    """An expression over atom numbers as one over the atoms of the network, known ones put in."""
+    numbers = np.array(sorted(set(atom_numbers(expression))), np.int64)
+    index, truth = _locate(network, numbers)
+    known: dict[Proposition, bool] = {
+        AtomRef(n): t for n, t, i in zip(numbers.tolist(), truth.tolist(), index.tolist(), strict=True) if i < 0
+    }
+    places = dict(zip(numbers.tolist(), index.tolist(), strict=True))
+    return renamed(simplified(expression, known), places)
+
+
+def _violations(network: Network, truth: NDArray[np.bool_]) -> list[Violation]:
+    """The soft formulas that a world pays for, in groundings that evidence leaves open."""
+    open_ = np.zeros(len(network.weights), np.int64)
+    for factors in (*network.clauses, *network.tables):
+        open_ += np.bincount(factors.weight, factors.count, len(open_)).astype(np.int64)
+    true = counts(network, truth) - network.decided_true
+    soft = np.isfinite(network.weights)
+    paid = np.where(network.weights > 0, open_ - true, true) * (soft & (network.weights != 0))
+    first = np.searchsorted(network.template, np.arange(len(network.model.templates)))
+    found = []
+    for w in np.flatnonzero(paid).tolist():
+        template = network.model.templates[network.template[w]]
+        text = row_text(template, network.model, w - int(first[network.template[w]])) if template.keys else template.text
+        found.append(Violation(text, int(paid[w]), float(network.weights[w])))
+    return found

@@ -1,0 +1,197 @@
+"""What a user asks for: texts in, atoms and ground formulas out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import assert_never
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
+from mlnlite.model.check import with_terms
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.formulas import All, Any, AtomRef, Const, Equal, Exists, Expression, Formula, Iff, Not, Var
+from mlnlite.model.model import Model
+from mlnlite.model.propositional import FALSE, TRUE, without_quantifiers
+from mlnlite.model.symbols import Predicate
+from mlnlite.model.typing import Constants, FormulaTyper, atoms_of
+from mlnlite.syntax import tree
+from mlnlite.syntax.queries import parse_atom_query, split_queries
+from mlnlite.syntax.write import write_formula
+
+Int64 = NDArray[np.int64]
+
+MOST_ROWS = 2_000_000
+"""Answers that one question may have."""
+
+
+@dataclass(frozen=True, slots=True)
+class GroundFormula:
+    """One grounding of a formula that was asked for: its text, and an expression whose `AtomRef` are atom numbers."""
+
+    text: str
+    expression: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What is asked.
+
+    Attributes:
+        atoms: shape (n,), numbers of single atoms, in the order asked.
+        formulas: anything else.
+        predicates: names of all predicates that it mentions.
+    """
+
+    atoms: Int64
+    formulas: tuple[GroundFormula, ...]
+    predicates: frozenset[str]
+
+    @property
+    def all_atoms(self) -> Int64:
+        """Numbers of the atoms asked for, and of those of the formulas."""
+        inside = [n for f in self.formulas for n in atom_numbers(f.expression)]
+        return np.unique(np.concatenate([self.atoms, np.array(inside, np.int64)]))
+
+
+def question_of(query: str | Sequence[str], model: Model, evidence: Evidence) -> Question:
+    """The question that texts mean.
+
+    Args:
+        query: predicate names, ground atoms, atoms with variables (all their groundings), formulas; separated by
+            commas or in a sequence.
+        model: the vocabulary.
+        evidence: the constants.
+
+    Raises:
+        SyntaxMistake: if a text is no formula.
+        QueryMistake: if it mentions an unknown predicate or constant.
+    """
+    texts = [query] if isinstance(query, str) else query
+    atoms: list[Int64] = []
+    formulas: list[GroundFormula] = []
+    names: set[str] = set()
+    mistakes: list[Diagnostic] = []
+    for text in (item for part in texts for item in split_queries(part)):
+        formula = parse_atom_query(text, model.dialect)
+        names |= {a.predicate for a in atoms_of(formula)}
+        predicate = model.predicates.get(formula.predicate) if isinstance(formula, tree.Atom) else None
+        if predicate is not None and predicate.arity and isinstance(formula, tree.Atom) and not formula.arguments:
+            atoms.append(_atoms_of_predicate(predicate, evidence))
+            continue
+        typed = _typed(formula, model, evidence, mistakes)
+        if typed is None:
+            continue
+        for binding, ground in _groundings(typed, evidence):
+            if isinstance(ground, AtomRef):
+                atoms.append(np.array([ground.index], np.int64))
+            else:
+                formulas.append(GroundFormula(_text(formula, binding, model), ground))
+    if mistakes:
+        raise QueryMistake(mistakes)
+    return Question(np.concatenate([np.empty(0, np.int64), *atoms]), tuple(formulas), frozenset(names))
+
+
+def _atoms_of_predicate(predicate: Predicate, evidence: Evidence) -> Int64:
+    ids = [np.flatnonzero(evidence.present[t][0]) for t in predicate.types]
+    n = int(np.prod([len(i) for i in ids], dtype=object))
+    if n > MOST_ROWS:
+        hint = f"ask for fewer: {predicate.name}(Constant, ...)"
+        raise QueryMistake(f"{predicate.name} has {n:,} atoms; at most {MOST_ROWS:,} can be asked for at once", hint)
+    grid = np.stack(np.meshgrid(*ids, indexing="ij"), -1).reshape(-1, predicate.arity)
+    return evidence.atom_number(predicate.name, grid.astype(np.int32))
+
+
+def _typed(formula: tree.Formula, model: Model, evidence: Evidence, mistakes: list[Diagnostic]) -> Formula | None:
+    before = len(mistakes)
+    constants = Constants({name: dict(t.index) for name, t in evidence.types.items()})
+    typed = FormulaTyper(model.predicates, constants, mistakes).typed(formula)
+    for atom in atoms_of(formula):
+        predicate = model.predicates.get(atom.predicate)
+        if predicate is None or predicate.arity != len(atom.arguments):
+            continue
+        for term, type_name in zip(atom.arguments, predicate.types, strict=True):
+            known = evidence.types[type_name].index
+            if isinstance(term, tree.Constant) and term.name not in known:
+                hint = did_you_mean(term.name, list(known)) or _some(list(known))
+                message = f"{term.name} is not a constant of the type {type_name}"
+                mistakes.append(Diagnostic("E502", message, term.span, hint))
+    return typed if len(mistakes) == before else None
+
+
+def _some(constants: list[str]) -> str:
+    shown = ", ".join(constants[:8]) + (", ..." if len(constants) > 8 else "")
+    return f"there are {shown}" if constants else "the type has no constants: give evidence"
+
+
+def _groundings(formula: Formula, evidence: Evidence) -> Iterator[tuple[dict[str, str], Expression]]:
+    """Each binding of the free variables (as text) with the expression over atom numbers."""
+    present = {name: np.flatnonzero(p[0]).tolist() for name, p in evidence.present.items()}
+    plain = without_quantifiers(formula, present)
+    free = formula.free
+    ranges = [present[formula.variables[v].type] for v in free]
+    n = int(np.prod([len(r) for r in ranges], dtype=object))
+    if n > MOST_ROWS:
+        raise QueryMistake(f"the formula has {n:,} groundings; at most {MOST_ROWS:,} can be asked for at once")
+    for values in product(*ranges):
+        binding = dict(zip(free, values, strict=True))
+        texts = {
+            formula.variables[v].name: evidence.types[formula.variables[v].type].constants[c]
+            for v, c in binding.items()
+        }
+        yield texts, _ground(plain, plain.body, binding, evidence)
+
+
+def _ground(formula: Formula, expression: Expression, binding: dict[int, int], evidence: Evidence) -> Expression:
+    def inside(e: Expression) -> Expression:
+        return _ground(formula, e, binding, evidence)
+
+    def value(term: Var | Const) -> int:
+        return binding[term.index] if isinstance(term, Var) else term.id
+
+    match expression:
+        case AtomRef(index):
+            schema = formula.atoms[index]
+            arguments = np.array([[value(t) for t in schema.arguments]], np.int32).reshape(1, -1)
+            return AtomRef(int(evidence.atom_number(schema.predicate, arguments)[0]))
+        case Equal(left, right):
+            return TRUE if value(left) == value(right) else FALSE
+        case Not(operand):
+            return Not(inside(operand))
+        case All(operands):
+            return All(tuple(map(inside, operands)))
+        case Any(operands):
+            return Any(tuple(map(inside, operands)))
+        case Iff(left_side, right_side):
+            return Iff(inside(left_side), inside(right_side))
+        case Exists():
+            raise AssertionError("quantifiers are written out before")
+        case _:
+            assert_never(expression)
+
+
+def _text(formula: tree.Formula, binding: dict[str, str], model: Model) -> str:
+    def change(term: tree.Term) -> tree.Term:
+        if isinstance(term, tree.Variable) and term.name in binding:
+            return tree.Constant(binding[term.name])
+        return term
+
+    return write_formula(with_terms(formula, change) if binding else formula, model.dialect)
+
+
+def atom_numbers(expression: Expression) -> Iterable[int]:
+    """Numbers of the atoms of a ground expression."""
+    match expression:
+        case AtomRef(index):
+            return [index]
+        case Not(operand):
+            return atom_numbers(operand)
+        case All(operands) | Any(operands):
+            return [n for operand in operands for n in atom_numbers(operand)]
+        case Iff(left, right):
+            return [*atom_numbers(left), *atom_numbers(right)]
+        case _:
+            return []
