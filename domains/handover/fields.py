@@ -52,7 +52,8 @@ class CostField:
         parts: the distances that the costs are made of, each (V, K) [m].
         safety: C_S, shape (V, K) [m]; 0 where forbidden.
         reach: C_R, shape (V, K) [m]; infinite where forbidden.
-        excess: how far the nearest approach lies outside the reach bound, shape (V, K) [m]; negative inside.
+        excess: how far the tool certainly lies outside the arm's reach, shape (V, K) [m]; negative inside.
+        allowed: what the costs and the arm's reach leave, shape (V, K).
     """
 
     grasp: int
@@ -62,11 +63,7 @@ class CostField:
     safety: FloatArray
     reach: FloatArray
     excess: FloatArray
-
-    @property
-    def allowed(self) -> NDArray[np.bool_]:
-        """What the costs and the arm's reach bound leave, shape (V, K)."""
-        return np.asarray((self.safety > 0) & np.isfinite(self.reach) & (self.excess <= 1e-3), dtype=np.bool_)
+    allowed: NDArray[np.bool_]
 
 
 def cost_field(scene: Scene, grasps: GraspSet, grasp: int, options: Options) -> CostField:
@@ -78,8 +75,9 @@ def cost_field(scene: Scene, grasps: GraspSet, grasp: int, options: Options) -> 
     parts = distances(points, centres, rotations, options.distance)
     safe = safety(parts.to_hand, parts.to_face, parts.gripper_to_hand, options.limits.safety)
     reach = reachability(np.round(parts.to_grasp, 9), options.limits.reach)
-    excess = _excess(scene, grasps, grasp, centres, rotations)
-    return CostField(grasp, centres, rotations, parts, np.round(safe, 9), reach, excess)
+    excess = _excess(scene, rotations @ grasps.centres[grasp] + centres[:, None])
+    allowed = (safe > 0) & np.isfinite(reach) & (excess <= 1e-3)
+    return CostField(grasp, centres, rotations, parts, np.round(safe, 9), reach, excess, allowed)
 
 
 def cost_points(scene: Scene, grasp: FloatArray) -> Points:
@@ -98,13 +96,9 @@ def presented_direction(thing: HandoverObject, region: int) -> FloatArray:
     return centre / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
 
 
-def _excess(
-    scene: Scene, grasps: GraspSet, grasp: int, centres: FloatArray, rotations: FloatArray
-) -> FloatArray:
+def _excess(scene: Scene, tools: FloatArray) -> FloatArray:
+    """Distance of the tool, shape (V, K, 3) [m], beyond the reach bound of the arm, whatever the approach."""
     wrist, centre, radius = reach_bound(scene.robot.chain)
-    middle = scene.base.rotation @ centre + scene.base.position
-    frames = grasps.rotations[grasp][grasps.free[grasp]]
-    wrists = frames @ wrist + grasps.centres[grasp]
-    places = np.einsum("vkij,aj->vkai", rotations, wrists) + (centres - middle)[:, None, None]
-    distance: FloatArray = np.sqrt(np.einsum("vkai,vkai->vka", places, places)).min(axis=2) - radius
+    away = tools - (scene.base.rotation @ centre + scene.base.position)
+    distance: FloatArray = np.sqrt(np.einsum("vki,vki->vk", away, away)) - radius - np.linalg.norm(wrist)
     return distance

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import tomllib
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,8 @@ import pinocchio as pin
 
 from mlnlite import MlnError, did_you_mean
 from mlnlite.domains.handover.chain import Chain, chain_of
-from mlnlite.domains.handover.pose import Pose, pose_at
-
-DATA = files("mlnlite.domains.handover") / "data"
+from mlnlite.domains.handover.pose import FloatArray, Pose, locked, pose_at
+from mlnlite.domains.handover.tables import DATA
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +47,7 @@ class Robot:
         tool: frame of the grasp centre: x along the approach, y along the closing direction.
         gripper: its sizes.
         bases: for `standing` and `seated`, pose of the base in the world [m].
+        home: configuration in which the arm waits, shape (n,) [rad].
     """
 
     name: str
@@ -58,6 +57,7 @@ class Robot:
     tool: str
     gripper: Gripper
     bases: tuple[tuple[str, Pose], ...]
+    home: FloatArray
 
     def base(self, posture: str) -> Pose:
         """Pose of the base in the world for a receiver who is `standing` or `seated`."""
@@ -110,7 +110,8 @@ def read_robot(
 def _known_robot(name: str, entry: dict[str, Any], gripper: Gripper | None) -> Robot:
     bases = tuple((posture, pose_at(*numbers)) for posture, numbers in entry["base"].items())
     built = _build(entry["urdf"], (DATA / entry["urdf"]).read_text(), "")
-    return _robot(name, built, entry["tool"], gripper or Gripper(**entry["gripper"]), bases)
+    robot = _robot(name, built, entry["tool"], gripper or Gripper(**entry["gripper"]), bases)
+    return replace(robot, home=locked(entry["home"]))
 
 
 def _robot(
@@ -121,7 +122,9 @@ def _robot(
         frames = [frame.name for frame in model.frames]
         raise MlnError(f"robot {name!r} has no frame {tool!r}", hint=did_you_mean(tool, frames) or f"frames: {frames}")
     model, geometry = _only_chain(model, geometry, tool)
-    return Robot(name, model, geometry, chain_of(model, tool), tool, gripper, bases)
+    chain = chain_of(model, tool)
+    home = np.clip(np.zeros(model.nq), chain.lower, chain.upper)
+    return Robot(name, model, geometry, chain, tool, gripper, bases, locked(home))
 
 
 def _build(name: str, text: str, meshes: str) -> tuple[pin.Model, pin.GeometryModel]:
