@@ -15,7 +15,6 @@ from mlnlite.ground.network import Float, Network
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.conjunctions import Conjunctions
 from mlnlite.infer.marginal import WIDTH_LIMIT, Distributions, distributions_of, limit_reached
-from mlnlite.infer.parts import divide
 from mlnlite.infer.potentials import potentials_of
 from mlnlite.model.formulas import All, Any, AtomRef, Expression, Iff, Not
 
@@ -70,7 +69,7 @@ def formula_probabilities(network: Network, formulas: Sequence[Expression], *, w
     potentials = potentials_of(network, _conjunctions(definitions.forbidden), definitions.n_auxiliary)
     wanted = np.zeros(len(potentials.cardinality), np.bool_)
     wanted[[x.variable for x in literals if isinstance(x, Literal)]] = True
-    found = distributions_of(divide(potentials), wanted, wanted, width_limit)
+    found = distributions_of(potentials, wanted, wanted, width_limit)
     if np.isneginf(potentials.constant) or np.isneginf(found.log_z).any():
         raise contradiction(network)
     if found.wide and len(formulas) == 1:

@@ -9,13 +9,14 @@ from typing import Literal
 
 import numpy as np
 
-from mlnlite.ground.network import Bool, Float, Int64, Network
+from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
 from mlnlite.infer import toulbar2
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.elimination import best_world
 from mlnlite.infer.marginal import CLOSED_FORM, ELIMINATION, MEMORY_LIMIT, WIDTH_LIMIT, limit_reached
 from mlnlite.infer.order import TooWide, Tree, plan
-from mlnlite.infer.parts import SMALL, Batch, Division, Part, batches, divide, parts
+from mlnlite.infer.parts import SMALL, Batch, Part, batches, divide, parts
+from mlnlite.infer.peel import changed_by, peel, put_back_labels, put_back_values
 from mlnlite.infer.potentials import potentials_of
 from mlnlite.infer.satisfy import feasible_world
 from mlnlite.infer.score import log_weight, truth_of
@@ -96,7 +97,8 @@ def map_of(
         QueryMistake: a weight is not known.
     """
     potentials = potentials_of(network)
-    division = divide(potentials, small=2 if method == "wcsp" else SMALL)
+    core, leaves = (potentials, ()) if method == "wcsp" else peel(potentials, maximise=True)
+    division = divide(core, small=2 if method == "wcsp" else SMALL)
     n = division.n_components
     values = np.zeros(len(potentials.cardinality), np.int64)
     search = _Search(values, np.zeros(n), [""] * n, ["optimal"] * n, np.zeros(n))
@@ -112,24 +114,30 @@ def map_of(
     if for_toulbar2 and method != "wcsp" and (method == "ve" or not toulbar2.is_available()):
         raise limit_reached(network, search.wide, width_limit)
     _ask_toulbar2(network, for_toulbar2, (time_limit, seed), search)
-    return _answer(network, division, search)
+    put_back_values(leaves, search.values)
+    label = put_back_labels(leaves, division.label)
+    for component in np.unique(label[changed_by(leaves)]).tolist():
+        search.method[component] = search.method[component].replace(CLOSED_FORM, ELIMINATION)
+    return _answer(network, label, search)
 
 
-def _answer(network: Network, division: Division, search: _Search) -> BestWorld:
+def _answer(network: Network, label: Int32, search: _Search) -> BestWorld:
     """Puts the components together."""
     truth = truth_of(network, search.values)
     value = log_weight(network, truth)
-    proved = all(s == "optimal" for s in search.status)
+    used, component = np.unique(label[network.variable], return_inverse=True)
+    status = tuple(search.status[c] for c in used.tolist())
+    method = tuple(search.method[c] for c in used.tolist())
     return BestWorld(
         truth=truth,
         log_weight=value,
         bound=value + float(search.gap.sum()),
-        status="optimal" if proved else "feasible",
-        component=division.label[network.variable].astype(np.int64),
-        component_status=tuple(search.status),
-        component_method=tuple(search.method),
-        component_gap=search.gap,
-        methods=dict(Counter(search.method)),
+        status="optimal" if all(s == "optimal" for s in status) else "feasible",
+        component=component.ravel(),
+        component_status=status,
+        component_method=method,
+        component_gap=search.gap[used],
+        methods=dict(Counter(method)),
         largest_table=search.largest_table,
     )
 

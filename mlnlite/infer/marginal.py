@@ -8,12 +8,20 @@ from typing import Literal
 import numpy as np
 
 from mlnlite.errors import LimitReached
-from mlnlite.ground.network import Bool, Float, Int64, Network
+from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.elimination import log_sum
 from mlnlite.infer.order import TooWide, Tree, plan
 from mlnlite.infer.parts import Batch, Division, Part, batches, divide, parts
-from mlnlite.infer.potentials import potentials_of
+from mlnlite.infer.peel import (
+    Leaves,
+    changed_by,
+    peel,
+    put_back_distributions,
+    put_back_labels,
+    with_parents,
+)
+from mlnlite.infer.potentials import Potentials, potentials_of
 
 WIDTH_LIMIT = 1 << 25
 MEMORY_LIMIT = 1 << 27
@@ -50,6 +58,8 @@ class Distributions:
     Attributes:
         start: shape (n_variables,), where the distribution of each variable starts in `probability`.
         probability: shape (total cardinality,), nan where not worked out.
+        label: shape (n_variables,), the component of each variable (leaves that were peeled off have left numbers of
+            components unused).
         log_z: shape (n_components,), nan where not worked out.
         method: of each component, empty where not worked out.
         wide: components past the limit, with what it would have taken.
@@ -58,6 +68,7 @@ class Distributions:
 
     start: Int64
     probability: Float
+    label: Int32
     log_z: Float
     method: list[str]
     wide: list[tuple[Part, TooWide]] = field(default_factory=list)
@@ -89,43 +100,55 @@ def marginals_of(
     asked[slice(None) if atoms is None else atoms] = True
     wanted = np.zeros(len(potentials.cardinality), np.bool_)
     wanted[network.variable[asked]] = True
-    division = divide(potentials)
-    found = distributions_of(division, wanted, wanted if atoms is not None else None, width_limit)
+    found = distributions_of(potentials, wanted, wanted if atoms is not None else None, width_limit)
     if np.isneginf(potentials.constant) or np.isneginf(found.log_z).any():
         raise contradiction(network)
     if found.wide and too_wide == "raise":
         raise limit_reached(network, found.wide, width_limit)
     probability = np.where(asked, found.probability[found.start[network.variable] + network.value], np.nan)
-    label = division.label[network.variable].tolist()
+    label = found.label[network.variable].tolist()
     method = tuple(found.method[c] if a else "" for c, a in zip(label, asked.tolist(), strict=True))
     log_z = float(found.log_z.sum() + potentials.constant)
     exact = ~np.isnan(probability)
-    return AtomProbabilities(probability, exact, method, log_z, division.n_components, found.largest_table)
+    n_components = len(np.unique(found.label[: network.n_variables]))
+    return AtomProbabilities(probability, exact, method, log_z, n_components, found.largest_table)
 
 
 def distributions_of(
-    division: Division, wanted: Bool, needed: Bool | None = None, width_limit: int = WIDTH_LIMIT
+    potentials: Potentials, wanted: Bool, needed: Bool | None = None, width_limit: int = WIDTH_LIMIT
 ) -> Distributions:
     """Distributions of variables and the log partition function of each component.
 
     Args:
-        division: the components.
+        potentials: of a network.
         wanted: shape (n_variables,), whose distribution to work out.
         needed: shape (n_variables,): only components with one of these are looked at; None for all components.
         width_limit: largest number of entries of a table.
     """
-    cardinality = division.potentials.cardinality
-    start = np.cumsum(cardinality, dtype=np.int64) - cardinality
-    n = division.n_components
-    found = Distributions(start, np.full(int(cardinality.sum()), np.nan), np.full(n, np.nan), [""] * n)
-    take = np.ones(n, np.bool_)
+    core, leaves = peel(potentials, maximise=False)
+    wanted, division = with_parents(leaves, wanted), divide(core)
+    found = _nothing_yet(potentials, division, leaves)
+    take = np.ones(division.n_components, np.bool_)
     if needed is not None:
-        take = np.bincount(division.label[needed], minlength=n) > 0
+        take = np.bincount(division.label[with_parents(leaves, needed)], minlength=division.n_components) > 0
     for batch in batches(division, take):
         _list_worlds(batch, found)
     for part in parts(division, take):
         _eliminate(part, wanted, width_limit, found)
+    put_back_distributions(leaves, found.start, found.probability)
+    for component in np.unique(found.label[changed_by(leaves)]).tolist():
+        found.method[component] = found.method[component] and ELIMINATION
     return found
+
+
+def _nothing_yet(potentials: Potentials, division: Division, leaves: tuple[Leaves, ...]) -> Distributions:
+    """Distributions to be filled in."""
+    cardinality, n = potentials.cardinality, division.n_components
+    start = np.cumsum(cardinality, dtype=np.int64) - cardinality
+    label = put_back_labels(leaves, division.label)
+    log_z = np.full(n, np.nan)
+    log_z[division.label[label != division.label]] = 0.0
+    return Distributions(start, np.full(int(cardinality.sum()), np.nan), label, log_z, [""] * n)
 
 
 def _list_worlds(batch: Batch, found: Distributions) -> None:

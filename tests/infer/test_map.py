@@ -6,7 +6,7 @@ from hypothesis import given, settings
 
 from mlnlite.errors import Contradiction
 from mlnlite.infer import map as map_module
-from mlnlite.infer import parts
+from mlnlite.infer import parts, peel
 from mlnlite.infer.map import map_of
 from tests.networks import networks, world_weight, worlds
 
@@ -15,14 +15,15 @@ def best_weight(net):
     return max(world_weight(net, t) for t in worlds(net))
 
 
-@pytest.mark.parametrize("small", [1, 1024])
+@pytest.mark.parametrize(("small", "fewest"), [(1, 1), (1, 64), (1024, 1), (1024, 64)])
 @settings(max_examples=150, deadline=None)
 @given(net=networks())
-def test_best_world_equals_enumeration(net, small):
+def test_best_world_equals_enumeration(net, small, fewest):
     expected = best_weight(net)
     divide = parts.divide
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(map_module, "divide", lambda p, small_=0, **_: divide(p, small))
+        patch.setattr(map_module, "peel", lambda p, maximise: peel.peel(p, maximise=maximise, fewest=fewest))
         if np.isneginf(expected):
             with pytest.raises(Contradiction):
                 map_of(net)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 
 from mlnlite.errors import Contradiction
-from mlnlite.infer import marginal, parts
+from mlnlite.infer import marginal, parts, peel
 from mlnlite.infer.marginal import marginals_of
 from tests.networks import networks, world_weight, worlds
 
@@ -20,13 +20,14 @@ def enumerate_worlds(net):
     return peak + np.log(p.sum()), (p / p.sum()) @ truth
 
 
-@pytest.mark.parametrize("small", [1, 1024])
+@pytest.mark.parametrize(("small", "fewest"), [(1, 1), (1, 64), (1024, 1), (1024, 64)])
 @settings(max_examples=150, deadline=None)
 @given(net=networks())
-def test_marginals_equal_enumeration(net, small):
+def test_marginals_equal_enumeration(net, small, fewest):
     log_z, expected = enumerate_worlds(net)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(marginal, "divide", lambda p: parts.divide(p, small))
+        patch.setattr(marginal, "peel", lambda p, maximise: peel.peel(p, maximise=maximise, fewest=fewest))
         if expected is None:
             with pytest.raises(Contradiction):
                 marginals_of(net)
