@@ -43,7 +43,7 @@ def load(entry: EntryPoint) -> Plugin:
     """
     try:
         plugin = entry.load()
-    except ImportError as error:
+    except (ImportError, AttributeError) as error:
         raise MlnError(f"the plugin {entry.name} ({entry.value}) cannot be imported: {error}") from error
     if not isinstance(plugin, Plugin):
         raise MlnError(f"the plugin {entry.name} ({entry.value}) is a {type(plugin).__name__}, not a Plugin")

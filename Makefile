@@ -1,0 +1,56 @@
+# `make demo` and `make test` need Python 3.11 or newer and nothing else; they make their own environment in $(VENV).
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+OUT ?= out
+EXAMPLES := docs/examples
+CODE := mlnlite domains tests benchmarks
+
+.PHONY: demo test lint format benchmark clean help
+.DEFAULT_GOAL := help
+
+help:  ## what there is to make
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 12
+
+demo: $(VENV)/.installed  ## learn the example model, then ask it
+	@mkdir -p $(OUT)
+	$(BIN)/mlnlite learn $(EXAMPLES)/handover.mln $(EXAMPLES)/handover.db --predict graspRegion,handover -o $(OUT)/handover.mln
+	@echo
+	$(BIN)/mlnlite query $(OUT)/handover.mln -e $(EXAMPLES)/jug.db -q graspRegion,handover
+	@echo
+	$(BIN)/mlnlite query $(OUT)/handover.mln -e $(EXAMPLES)/jug.db -q graspRegion,handover --task map
+	@echo
+	@echo "The learnt model is $(OUT)/handover.mln; what it was learnt from and asked about is in $(EXAMPLES)/."
+
+test: $(VENV)/.installed-dev  ## run all tests
+	$(BIN)/python -m pytest -q $(ARGS)
+
+lint: $(VENV)/.installed-dev  ## format check, lint, types, import contract
+	$(BIN)/ruff format --check $(CODE)
+	$(BIN)/ruff check $(CODE)
+	$(BIN)/mypy mlnlite domains
+	$(BIN)/lint-imports
+
+format: $(VENV)/.installed-dev  ## put the code into shape
+	$(BIN)/ruff format $(CODE)
+	$(BIN)/ruff check --fix $(CODE)
+
+benchmark: $(VENV)/.installed-dev  ## time the commands
+	$(BIN)/python -m pytest -q benchmarks --benchmark-only $(ARGS)
+
+clean:  ## remove what was made, the environment included
+	rm -rf $(VENV) $(OUT) build dist *.egg-info
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "mlnlite needs Python 3.11 or newer; name it with PYTHON=..."; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,handover]'
+	@touch $@ $(VENV)/.installed

@@ -1,0 +1,103 @@
+"""The commands. Here, and nowhere else, something is printed and the process ends with an exit code.
+
+Exit codes: 0 an answer, 1 no answer within the limits, 2 a mistake of the user, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import EntryPoint
+
+import click
+
+from mlnlite import __version__
+from mlnlite.errors import LimitReached, MlnError
+
+COMMANDS = {
+    "check": "Say what a model and its evidence are, and what is wrong with them.",
+    "learn": "Learn the weights of a model from databases.",
+    "query": "Ask a model: probabilities, or the most probable world.",
+    "evaluate": "Measure how well a model predicts what databases already say.",
+}
+"""The built-in commands with a line each; `mlnlite.cli.NAME` is imported when NAME is asked for."""
+
+NO_ANSWER, USER_ERROR, INTERRUPTED = 1, 2, 130
+
+
+class Commands(click.Group):
+    """The built-in commands and those of plugins, each loaded when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Built-in commands first."""
+        return [*COMMANDS, *sorted(_plugins())]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """A command by name."""
+        if cmd_name in COMMANDS:
+            command = getattr(import_module(f"mlnlite.cli.{cmd_name}"), cmd_name)
+            return command if isinstance(command, click.Command) else None
+        entry = _plugins().get(cmd_name)
+        return _plugin_commands(entry) if entry else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """One line for each command, without loading the built-in ones."""
+        rows = list(COMMANDS.items())
+        rows += [(name, _summary(entry)) for name, entry in sorted(_plugins().items())]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Runs a command; a user's mistake becomes a message and an exit code."""
+        try:
+            return super().invoke(ctx)
+        except MlnError as error:
+            click.echo(_message(error, ctx.meta.get("mlnlite.format")), err=True)
+            ctx.exit(NO_ANSWER if isinstance(error, LimitReached) else USER_ERROR)
+        except KeyboardInterrupt:
+            click.echo("interrupted", err=True)
+            ctx.exit(INTERRUPTED)
+
+
+def _message(error: MlnError, format_name: object) -> str:
+    if format_name != "json":
+        return str(error)
+    import json
+
+    kind = type(error).__name__
+    return json.dumps({"error": kind, "diagnostics": [d.to_dict() for d in error.diagnostics]}, indent=2)
+
+
+def _plugins() -> dict[str, EntryPoint]:
+    from mlnlite.plugins import installed
+
+    return {name: entry for name, entry in installed().items() if name not in COMMANDS}
+
+
+def _plugin_commands(entry: EntryPoint) -> click.Group:
+    from mlnlite.plugins import load
+
+    return load(entry).commands()
+
+
+def _summary(entry: EntryPoint) -> str:
+    """The plugin's own line, or why there is none: a broken plugin is not hidden."""
+    from mlnlite.plugins import load
+
+    try:
+        return load(entry).summary
+    except MlnError as error:
+        return f"broken: {error.diagnostics[0].message}"
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(__version__, prog_name="mlnlite")
+def mlnlite() -> None:
+    """Markov logic networks: exact where affordable, fast, and clear.
+
+    Exit codes: 0 an answer, 1 no answer within the limits, 2 a mistake in the input, 130 interrupted.
+    """
+
+
+def main() -> None:
+    """The entry point of the `mlnlite` command."""
+    mlnlite(prog_name="mlnlite")

@@ -1,0 +1,86 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from mlnlite.cli.files import verify_writable
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+FILE = click.Path(path_type=Path)
+
+
+def _remember(ctx: click.Context, _: click.Parameter, value: str) -> str:
+    """Keeps the format where the error report finds it."""
+    ctx.meta["mlnlite.format"] = value
+    return value
+
+
+def _writable(_: click.Context, __: click.Parameter, value: Path | None) -> Path | None:
+    if value is not None:
+        verify_writable(value)
+    return value
+
+
+def format_option(*names: str) -> Callable[[Command], Command]:
+    """`--format`; the first name is the default."""
+    return click.option(
+        "--format",
+        type=click.Choice(names),
+        default=names[0],
+        show_default=True,
+        is_eager=True,
+        callback=_remember,
+        help="How the answer is written.",
+    )
+
+
+dialect_option = click.option(
+    "--dialect",
+    type=click.Choice(["standard", "prac"]),
+    help="`standard`: variables start lower case; `prac`: variables are written ?x. By default found out.",
+)
+output_option = click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    callback=_writable,
+    help="File to write; it appears when it is complete. By default standard output.",
+)
+time_limit_option = click.option(
+    "--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Stop after this long."
+)
+evidence_option = click.option(
+    "-e",
+    "--evidence",
+    type=FILE,
+    multiple=True,
+    metavar="FILE",
+    help="Facts that are known. Several files describe one world together.",
+)
+database_option = click.option(
+    "--database", type=click.IntRange(min=1), metavar="N", help="Which of the databases of the file, the first being 1."
+)
+closed_world_option = click.option(
+    "--closed-world",
+    multiple=True,
+    metavar="NAMES",
+    help="Predicates whose atoms are false unless they are facts; `all`: all that are not asked about.",
+)
+open_world_option = click.option(
+    "--open-world", multiple=True, metavar="NAMES", help="Predicates whose world stays open nevertheless."
+)
+
+
+def names(values: Sequence[str]) -> list[str]:
+    """The names of a repeated, comma-separated option.
+
+    >>> names(["isA,hasShape", "handover"])
+    ['isA', 'hasShape', 'handover']
+    """
+    return [name.strip() for value in values for name in value.split(",") if name.strip()]

@@ -1,0 +1,159 @@
+"""`mlnlite query`: model, evidence and a question to an answer."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
+
+import click
+
+from mlnlite.cli.files import emit
+from mlnlite.cli.options import (
+    FILE,
+    closed_world_option,
+    database_option,
+    dialect_option,
+    evidence_option,
+    format_option,
+    names,
+    open_world_option,
+    output_option,
+    time_limit_option,
+)
+from mlnlite.cli.terminal import working
+from mlnlite.cli.worlds import closed_world, evidence_of_one_world, opened
+from mlnlite.errors import QueryMistake
+
+if TYPE_CHECKING:
+    from mlnlite.model.evidence import Evidence
+    from mlnlite.model.model import Model
+    from mlnlite.results import MapState, Marginals
+    from mlnlite.syntax.tree import Dialect
+
+
+class _Options(TypedDict):
+    models: tuple[Path, ...]
+    evidence: tuple[Path, ...]
+    query: tuple[str, ...]
+    task: Literal["marginal", "map"]
+    closed_world: tuple[str, ...]
+    open_world: tuple[str, ...]
+    method: Literal["auto", "ve", "wcsp"]
+    database: int | None
+    output: Path | None
+    time_limit: float | None
+    seed: int
+    width_limit: int | None
+    dialect: Dialect | None
+    format: Literal["text", "json", "csv"]
+
+
+@click.command()
+@click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...")
+@evidence_option
+@click.option(
+    "-q",
+    "--query",
+    multiple=True,
+    metavar="QUERY",
+    help="Predicates, ground atoms or formulas, comma separated. `--task map` without it shows all unknown atoms.",
+)
+@click.option(
+    "--task", type=click.Choice(["marginal", "map"]), default="marginal", show_default=True, help="What to ask."
+)
+@closed_world_option
+@open_world_option
+@click.option(
+    "--method",
+    type=click.Choice(["auto", "ve", "wcsp"]),
+    default="auto",
+    show_default=True,
+    help="`ve`: variable elimination; `wcsp`: toulbar2 (MAP only).",
+)
+@database_option
+@output_option
+@time_limit_option
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Where chance starts.")
+@click.option(
+    "--width-limit",
+    type=click.IntRange(min=2),
+    metavar="ENTRIES",
+    help="Largest number of entries of a table in exact inference.",
+)
+@dialect_option
+@format_option("text", "json", "csv")
+def query(**options: Unpack[_Options]) -> None:
+    """Ask a model: probabilities, or the most probable world.
+
+    An atom that is not a fact is unknown, unless its predicate's world is closed: by `*` in the model, or here.
+    Several evidence files describe one world together; of a file with several databases choose one by --database.
+    """
+    import mlnlite as ml
+    from mlnlite.syntax.queries import split_queries
+
+    items = [item for text in options["query"] for item in split_queries(text)]
+    _verify(options, items)
+    with working("reading"):
+        model = opened(ml.read_model(*options["models"], dialect=options["dialect"]), names(options["open_world"]))
+        evidence = evidence_of_one_world(model, options["evidence"], options["database"])
+    with working("inferring"):
+        answer = _answer(model, evidence, items, options)
+    emit(_formatted(answer, options["format"], whole=options["output"] is not None), options["output"])
+
+
+def _answer(model: Model, evidence: Evidence, items: list[str], options: _Options) -> Marginals | MapState:
+    import mlnlite as ml
+    from mlnlite.infer.marginal import WIDTH_LIMIT
+
+    closed = closed_world(model, items, names(options["closed_world"]), names(options["open_world"]))
+    if options["task"] == "map":
+        return ml.map_state(
+            model,
+            evidence,
+            items or None,
+            closed_world=closed,
+            method=options["method"],
+            time_limit=options["time_limit"],
+            seed=options["seed"],
+        )
+    return ml.marginal(model, evidence, items, closed_world=closed, width_limit=options["width_limit"] or WIDTH_LIMIT)
+
+
+def _verify(options: _Options, items: list[str]) -> None:
+    """Complains about options that do not fit the task."""
+    if options["task"] == "map":
+        if options["width_limit"] is not None:
+            raise click.UsageError("--width-limit is for --task marginal; --task map takes --time-limit")
+        return
+    if not items:
+        raise QueryMistake("nothing is asked", "name predicates, atoms or formulas: `-q Smokes,Cancer(Ann)`")
+    if options["time_limit"] is not None:
+        raise click.UsageError("--time-limit is for --task map; --task marginal takes --width-limit")
+    if options["method"] == "wcsp":
+        raise click.UsageError("--method wcsp is for --task map")
+
+
+def _formatted(answer: Marginals | MapState, format_name: str, *, whole: bool) -> str:
+    """The answer as text; `whole`: with all its rows."""
+    if format_name == "json":
+        return answer.to_json()
+    if format_name == "csv":
+        return _csv(answer).rstrip("\n")
+    return answer.to_text(None) if whole else str(answer)
+
+
+def _csv(answer: Marginals | MapState) -> str:
+    """One row for each atom or formula."""
+    from mlnlite.results import Marginals
+
+    rows: list[tuple[object, ...]]
+    if isinstance(answer, Marginals):
+        numbers = (answer.probabilities.tolist(), answer.methods, answer.exact.tolist(), answer.error.tolist())
+        rows = [("name", "probability", "method", "exact", "error"), *zip(answer.names, *numbers, strict=True)]
+    else:
+        rows = [("name", "truth", "method"), *zip(answer.names, answer.truth.tolist(), answer.methods, strict=True)]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
