@@ -1,7 +1,7 @@
-"""Markov logic networks: exact where affordable, fast, and clear.
+r"""Markov logic networks: exact where affordable, fast, and clear.
 
 >>> import mlnlite as ml
->>> model = ml.model_from_text("Smokes(person)\\nCancer(person)\\n1.5 Smokes(x) => Cancer(x)")
+>>> model = ml.model_from_text("Smokes(person)\nCancer(person)\n1.5 Smokes(x) => Cancer(x)")
 >>> evidence = ml.evidence_from_text("Smokes(Anna)", model=model)
 >>> print(f"{ml.marginal(model, evidence, query=['Cancer'])['Cancer(Anna)']:.4f}")
 0.8176

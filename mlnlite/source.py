@@ -65,9 +65,9 @@ class Span:
         return f"{self.source.name}:{line}:{column}"
 
     def excerpt(self, width: int = 100) -> str:
-        """The line of the span with carets under it.
+        r"""The line of the span with carets under it.
 
-        >>> print(Span(Source("m.mln", "P(x)\\nQ(y) => R"), 5, 9).excerpt())
+        >>> print(Span(Source("m.mln", "P(x)\nQ(y) => R"), 5, 9).excerpt())
           2 | Q(y) => R
             | ^^^^
         """

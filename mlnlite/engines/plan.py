@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Column: TypeAlias = NDArray[np.int64] | NDArray[np.int32]
-Relation: TypeAlias = Mapping[str, Column]
+Relation: TypeAlias = Mapping[str, NDArray[np.int64]]
 """Columns of equal length, by name."""
 
 Tables: TypeAlias = Mapping[str, tuple[Column, ...]]
@@ -22,8 +22,11 @@ Tables: TypeAlias = Mapping[str, tuple[Column, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """Rows of a stored table. Each entry of `columns` names a column (twice the same name: equal), is a number that
-    the column must have, or None for a column that does not matter."""
+    """Rows of a stored table.
+
+    Each entry of `columns` names a column (twice the same name: equal), is a number that the column must have, or None
+    for a column that does not matter.
+    """
 
     table: str
     columns: tuple[str | int | None, ...]
@@ -72,9 +75,11 @@ class Compute:
 
 @dataclass(frozen=True, slots=True)
 class Lookup:
-    """Adds the column `name`: the last column of the row of a stored table whose first columns are those of `key`
-    (column names or numbers), or `default` (a number, or another column) where there is no such row. The key is unique
-    in the table."""
+    """Adds a column `name` from a stored table.
+
+    It is the last column of the table's row whose first columns are those of `key` (column names or numbers), or
+    `default` (a number, or another column) where there is no such row. The key is unique in the table.
+    """
 
     source: Plan
     table: str

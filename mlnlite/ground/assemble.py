@@ -120,7 +120,7 @@ def atom_range(predicate: Predicate, evidence: Evidence) -> tuple[int, int]:
 
 
 def _with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
-    """The atoms, with the other open atoms of their blocks, and for each the number of its block's first atom, or -1."""
+    """The atoms and the other open atoms of their blocks, and for each the number of its block's first atom, or -1."""
     blocks = np.full(len(atoms), -1, np.int64)
     for predicate in evidence.predicates.values():
         if predicate.value is None:
@@ -144,20 +144,18 @@ def _first_of_block(atoms: Int64, low: int, stride: int, size: int) -> Int64:
     return np.asarray(atoms - value * stride, np.int64)
 
 
-def _variables(
-    atoms: Int64, block: Int64, evidence: Evidence
-) -> tuple[Int32, Int32, Int32, NDArray[np.bool_]]:
+def _variables(atoms: Int64, block: Int64, evidence: Evidence) -> tuple[Int32, Int32, Int32, NDArray[np.bool_]]:
     """Variable and value of each atom; cardinality of each variable and whether it is a block."""
     owner = np.where(block >= 0, block, atoms)
     # a block's first atom may be a known one, and then is not among the atoms: owners are numbers of their own kind
-    names, variable = np.unique(np.column_stack([owner, block >= 0]), axis=0, return_inverse=True)
-    variable = variable.reshape(-1).astype(np.int32)
-    is_block = names[:, 1].astype(bool) if len(names) else np.empty(0, bool)
+    names, number = np.unique(owner * 2 + (block >= 0), return_inverse=True)
+    variable: Int32 = number.reshape(-1).astype(np.int32)
+    is_block = names % 2 == 1
     order = np.lexsort((atoms, variable))
     start = np.searchsorted(variable[order], np.arange(len(names)))
     within = np.empty(len(atoms), np.int64)
     within[order] = np.arange(len(atoms)) - start[variable[order]]
-    none = _may_be_none(names[:, 0] if len(names) else names.reshape(-1), is_block, evidence)
+    none = _may_be_none(names // 2, is_block, evidence)
     value = np.where(is_block[variable], within + none[variable], 1)
     members = np.bincount(variable, minlength=len(names))
     cardinality = np.where(is_block, members + none, 2)

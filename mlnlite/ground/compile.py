@@ -17,7 +17,6 @@ from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import Argument, AtomRef, AtomSchema, Const, Equal, Formula, Var
 from mlnlite.model.propositional import Cube
 
-
 WORLDS = "worlds"
 """Table of the numbers of the databases."""
 
@@ -112,7 +111,7 @@ def bindings(source: Source, cube: Cube, needed: Sequence[int]) -> Plan:
     plan, bound = _spread(plan, bound, equal)
     plan, filters = _filtered(plan, bound, filters)
     for equality in equal:
-        plan = Where(plan, *_ordered(equality, "="))
+        plan = Where(plan, side(equality.left), "=", side(equality.right))
     return plan
 
 
@@ -145,11 +144,7 @@ def _excluded(source: Source, schema: AtomSchema, truth: bool) -> _Filter:
 
 def _different(equality: Equal) -> _Filter:
     needs = frozenset(variables_of((equality.left, equality.right)))
-    return _Filter(needs, lambda plan: Where(plan, *_ordered(equality, "!=")))
-
-
-def _ordered(equality: Equal, operator: str) -> tuple[str | int, str, str | int]:
-    return side(equality.left), operator, side(equality.right)
+    return _Filter(needs, lambda plan: Where(plan, side(equality.left), "!=", side(equality.right)))
 
 
 def _filtered(plan: Plan, bound: set[int], filters: list[_Filter]) -> tuple[Plan, list[_Filter]]:

@@ -1,4 +1,4 @@
-"""Rows of a template's plan, gathered by what evidence knows: rows that know the same have the same residual formula."""
+"""Rows of a template's plan, gathered by what evidence knows: rows that know the same leave the same formula."""
 
 from __future__ import annotations
 
@@ -61,9 +61,7 @@ def _equal_rows(code: Int64) -> list[Int64]:
     return list(np.split(order, np.flatnonzero(np.diff(code[order])) + 1))
 
 
-def _features(
-    formula: Formula, plan: Compiled, rows: Relation
-) -> dict[Proposition | tuple[int, int], Int64]:
+def _features(formula: Formula, plan: Compiled, rows: Relation) -> dict[Proposition | tuple[int, int], Int64]:
     """Small numbers for each row: 0 unknown, 1 true, 2 false for a proposition; 1 for a pair of atoms that coincide."""
     features: dict[Proposition | tuple[int, int], Int64] = {}
     atoms = {i: rows[atom_column(i)] for i in plan.atoms}

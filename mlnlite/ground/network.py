@@ -103,6 +103,16 @@ class Network:
         return len(self.cardinality)
 
     @property
+    def n_open(self) -> Int64:
+        """For each weight, the number of groundings that evidence leaves open."""
+        total = np.zeros(len(self.weights), np.int64)
+        for clauses in self.clauses:
+            total += np.bincount(clauses.weight, clauses.count, len(total)).astype(np.int64)
+        for tables in self.tables:
+            total += np.bincount(tables.weight, tables.count, len(total)).astype(np.int64)
+        return total
+
+    @property
     def n_factors(self) -> int:
         """Number of distinct ground formulas that evidence leaves open."""
         return sum(len(c.literals) for c in self.clauses) + sum(len(t.atoms) for t in self.tables)

@@ -1,7 +1,8 @@
 """Evidence as tables for the engines, with all that follows from functional predicates drawn.
 
 Tables have the database in their first column. `P.true` and `P.false` hold what is known of predicate P, `P.known` both
-with a last column that is `KNOWN_TRUE` or `KNOWN_FALSE`; `type:T` holds the constants of type T, `worlds` the databases.
+with a last column that is `KNOWN_TRUE` or `KNOWN_FALSE`; `type:T` holds the constants of type T, `worlds` the numbers
+of the databases.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def _other_values(true: Int32, column: int, present: NDArray[np.bool_]) -> Int32
     values = np.tile(np.arange(n, dtype=np.int32), len(true))
     keep = (values != rows[:, column]) & present[rows[:, 0], values]
     rows[:, column] = values
-    return rows[keep]
+    return np.asarray(rows[keep], np.int32)
 
 
 def _last_values(predicate: Predicate, rows: Int32, truth: NDArray[np.bool_], evidence: Evidence) -> Int32:

@@ -224,16 +224,16 @@ def _over_network(expression: Expression, network: Network) -> Expression:
 
 def _violations(network: Network, truth: NDArray[np.bool_]) -> list[Violation]:
     """The soft formulas that a world pays for, in groundings that evidence leaves open."""
-    open_ = np.zeros(len(network.weights), np.int64)
-    for factors in (*network.clauses, *network.tables):
-        open_ += np.bincount(factors.weight, factors.count, len(open_)).astype(np.int64)
     true = counts(network, truth) - network.decided_true
+    open_ = network.n_open
     soft = np.isfinite(network.weights)
     paid = np.where(network.weights > 0, open_ - true, true) * (soft & (network.weights != 0))
     first = np.searchsorted(network.template, np.arange(len(network.model.templates)))
     found = []
     for w in np.flatnonzero(paid).tolist():
         template = network.model.templates[network.template[w]]
-        text = row_text(template, network.model, w - int(first[network.template[w]])) if template.keys else template.text
+        text = (
+            row_text(template, network.model, w - int(first[network.template[w]])) if template.keys else template.text
+        )
         found.append(Violation(text, int(paid[w]), float(network.weights[w])))
     return found

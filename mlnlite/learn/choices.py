@@ -80,7 +80,7 @@ def choices(entries: Mapping[str, Entries], evidence: Evidence, n_weights: int) 
 def _n_choices(predicate: Predicate, evidence: Evidence) -> NDArray[np.float64]:
     """Number of atoms, or of blocks, of a predicate in each database."""
     sizes = [evidence.present[predicate.types[k]].sum(axis=1).astype(float) for k in predicate.keys]
-    return np.prod([np.ones(evidence.n_databases), *sizes], axis=0)
+    return np.asarray(np.prod([np.ones(evidence.n_databases), *sizes], axis=0))
 
 
 def _block_of(predicate: Predicate, atom: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
@@ -115,7 +115,7 @@ def _binary(
     """One alternative for each touched atom: the other truth value."""
     units, unit = _numbered(np.column_stack([found.database, found.atom]))
     true = np.column_stack(_facts_true(predicate, evidence))
-    both, number = _numbered(np.concatenate([units, true]))
+    _, number = _numbered(np.concatenate([units, true]))
     is_true = np.isin(number[: len(units)], number[len(units) :])
     sign = np.where(is_true, 1.0, -1.0)
     matrix = sparse.csr_array((found.change * sign[unit], (unit, found.weight)), shape=(len(units), n_weights))

@@ -39,9 +39,7 @@ class Entries:
     change: Int64
 
 
-def entries(
-    templates: Sequence[Template], evidence: Evidence, run: Run, targets: frozenset[str]
-) -> dict[str, Entries]:
+def entries(templates: Sequence[Template], evidence: Evidence, run: Run, targets: frozenset[str]) -> dict[str, Entries]:
     """The entries of all templates for the atoms of each target predicate.
 
     Args:
@@ -71,9 +69,7 @@ def _cases(source: Source) -> Iterator[tuple[int, Case]]:
             yield sign, case
 
 
-def _counted(
-    source: Source, case: Case, target: int, sign: int, first: int, run: Run
-) -> list[Entries]:
+def _counted(source: Source, case: Case, target: int, sign: int, first: int, run: Run) -> list[Entries]:
     schema, truth = case.literals[target]
     predicate = source.evidence.predicates[schema.predicate]
     others = _others(case, target, predicate)

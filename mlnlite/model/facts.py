@@ -162,10 +162,10 @@ def _sorted(name: str, reading: _Reading) -> Facts:
     columns = reading.columns.get(name)
     if columns is None:
         return Facts(np.empty(0, np.int32), np.empty((0, predicate.arity), np.int32), np.empty(0, np.bool_))
-    database, arguments, truth = (np.concatenate(c) for c in (columns.database, columns.arguments, columns.truth))
-    file, offset = np.concatenate(columns.file), np.concatenate(columns.offset)
+    database, arguments = np.concatenate(columns.database), np.concatenate(columns.arguments)
     order = np.lexsort((*reversed(arguments.T), database))
-    database, arguments, truth, file, offset = (a[order] for a in (database, arguments, truth, file, offset))
+    database, arguments, truth = database[order], arguments[order], np.concatenate(columns.truth)[order]
+    file, offset = np.concatenate(columns.file)[order], np.concatenate(columns.offset)[order]
     again = np.zeros(len(order), bool)
     again[1:] = (database[1:] == database[:-1]) & (arguments[1:] == arguments[:-1]).all(axis=1)
     for i in np.flatnonzero(again & (truth != np.roll(truth, 1)))[:MOST_MISTAKES]:

@@ -86,7 +86,7 @@ class Iff:
 
 @dataclass(frozen=True, slots=True)
 class Exists:
-    """Some binding of `variables` makes `body` true. (FORALL is `Not(Exists(v, Not(body)))`.)"""
+    """Some binding of `variables` makes `body` true. FORALL is `Not(Exists(v, Not(body)))`."""
 
     variables: tuple[int, ...]
     body: Expression

@@ -8,9 +8,10 @@ from typing import TypeAlias, assert_never
 
 from mlnlite.errors import Diagnostic, did_you_mean
 from mlnlite.model import formulas as typed
+from mlnlite.model.formulas import Argument
 from mlnlite.model.symbols import Predicate
+from mlnlite.source import Span
 from mlnlite.syntax import tree
-
 
 _Build: TypeAlias = Callable[[], typed.Expression]
 
@@ -33,7 +34,7 @@ class _Variable:
     type: str | None = None
     bound: bool = False
     plus: bool = False
-    span: tree.Span | None = None
+    span: Span | None = None
 
 
 @dataclass(slots=True)
@@ -50,7 +51,7 @@ class FormulaTyper:
     holes: dict[int, int] = field(default_factory=dict)
     atoms: dict[typed.AtomSchema, int] = field(default_factory=dict)
     _scopes: list[dict[str, int]] = field(default_factory=lambda: [{}])
-    _equalities: list[tuple[tree.Equality, typed.Argument | str, typed.Argument | str]] = field(default_factory=list)
+    _equalities: list[tuple[tree.Equality, Argument | str, Argument | str]] = field(default_factory=list)
 
     def typed(self, formula: tree.Formula) -> typed.Formula | None:
         """The typed formula, or None if there was a mistake."""
@@ -140,10 +141,10 @@ class FormulaTyper:
 
         return build
 
-    def _side(self, term: tree.Term) -> typed.Argument | str:
+    def _side(self, term: tree.Term) -> Argument | str:
         return term.name if isinstance(term, tree.Constant) else typed.Var(self._variable(term))
 
-    def _resolved(self, side: typed.Argument | str, other: typed.Argument | str) -> typed.Argument:
+    def _resolved(self, side: Argument | str, other: Argument | str) -> Argument:
         if not isinstance(side, str):
             return side
         assert isinstance(other, typed.Var)
@@ -151,7 +152,7 @@ class FormulaTyper:
 
     # --- terms
 
-    def _term(self, term: tree.Term, type_name: str) -> typed.Argument:
+    def _term(self, term: tree.Term, type_name: str) -> Argument:
         if isinstance(term, tree.Constant):
             return typed.Const(self.constants.id(type_name, term.name))
         index = self._variable(term)
@@ -183,12 +184,14 @@ class FormulaTyper:
         self.variables.append(variable)
         return len(self.variables) - 1
 
-    def _set_type(self, index: int, type_name: str, span: tree.Span | None) -> None:
+    def _set_type(self, index: int, type_name: str, span: Span | None) -> None:
         variable = self.variables[index]
         if variable.type in (None, "?"):
             variable.type = type_name
         elif variable.type != type_name:
-            message = f"the variable {variable.name} is a {variable.type} elsewhere in this formula and a {type_name} here"
+            message = (
+                f"the variable {variable.name} is a {variable.type} elsewhere in this formula and a {type_name} here"
+            )
             self._mistake("E204", message, span, "a variable has one type; use two variables")
 
     def _spread_types(self) -> None:
@@ -209,7 +212,7 @@ class FormulaTyper:
             message = f"the variable {variable.name} stands in no atom, so its type is unknown"
         self._mistake("E205", message, variable.span, "use it in an atom, or remove it")
 
-    def _mistake(self, code: str, message: str, span: tree.Span | None, hint: str = "") -> None:
+    def _mistake(self, code: str, message: str, span: Span | None, hint: str = "") -> None:
         diagnostic = Diagnostic(code, message, span, hint)
         if diagnostic not in self.mistakes:
             self.mistakes.append(diagnostic)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 import numpy as np
@@ -43,7 +43,7 @@ def row_text(template: Template, model: Model, row: int) -> str:
     for key in holes:
         type_name = template.formula.variables[template.keys[key]].type
         constants.append(tree.Constant(model.types[type_name].constants[template.rows[row, key]]))
-    return write_formula(_filled(formula, lambda hole: constants[hole]), model.dialect)
+    return write_formula(_filled(formula, constants), model.dialect)
 
 
 def _statements(template: Template, model: Model) -> Iterator[tree.Statement]:
@@ -79,12 +79,12 @@ def _row_by_row(
     template: Template, formula: tree.Formula, columns: tuple[tuple[str, ...], ...]
 ) -> Iterator[tree.FormulaStatement]:
     for row, weight in enumerate(template.weights.tolist()):
-        constants = [column[row] for column in columns]
-        yield _weighted(template, _filled(formula, lambda hole, c=constants: tree.Constant(c[hole])), weight)
+        constants = [tree.Constant(column[row]) for column in columns]
+        yield _weighted(template, _filled(formula, constants), weight)
 
 
-def _filled(formula: tree.Formula, constant: Callable[[int], tree.Term]) -> tree.Formula:
-    return with_terms(formula, lambda t: constant(t.index) if isinstance(t, tree.Hole) else t)
+def _filled(formula: tree.Formula, constants: Sequence[tree.Constant]) -> tree.Formula:
+    return with_terms(formula, lambda t: constants[t.index] if isinstance(t, tree.Hole) else t)
 
 
 class _Untyper:
