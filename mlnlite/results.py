@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mlnlite.errors import MissingPart, QueryMistake, did_you_mean
 
 if TYPE_CHECKING:
-    import pandas as pd  # type: ignore[import-untyped]
+    import pandas as pd
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]

@@ -11,7 +11,7 @@ import os
 import sys
 from typing import Any
 
-from pytoulbar2 import CFN  # type: ignore[import-untyped]
+from pytoulbar2 import CFN
 
 
 def main() -> None:

@@ -164,7 +164,9 @@ def _core(potentials: Potentials, single: Float, leaves: list[Leaves]) -> Potent
     value = np.concatenate([np.arange(k, dtype=np.int32) for k in potentials.cardinality.tolist()])
     own = Cells(variable[:, None], value[:, None], single)
     cells = [_pick(own, (single != 0) & ~gone[variable])]
-    cells += [_pick(c, ~gone[c.scope].any(axis=1)) for c in potentials.cells if c.scope.shape[1] > 1]
+    for c in potentials.cells:
+        if c.scope.shape[1] > 1:
+            cells.append(_pick(c, np.logical_not(gone[c.scope].any(axis=1))))
     cardinality = np.where(gone, 1, potentials.cardinality).astype(np.int32)
     return replace(potentials, cardinality=cardinality, cells=tuple(c for c in cells if len(c.amount)))
 

@@ -81,10 +81,7 @@ def decided_log_weight(network: Network) -> float:
 
 def decided_false(network: Network) -> Int64:
     """Indices of the hard weights of which evidence makes a grounding false."""
-    possible = network.decided_true.copy()
-    blocks: tuple[Clauses | Tables, ...] = (*network.clauses, *network.tables)
-    for block in blocks:
-        np.add.at(possible, block.weight, block.count)
+    possible = network.decided_true + network.n_open
     return np.flatnonzero(np.isposinf(network.weights) & (possible < network.n_groundings))
 
 
