@@ -1,1 +1,105 @@
-"""The handover domain."""
+"""Robot-to-human handovers that mind affordances and arm mobility: where to hand an object over, how to hold it, and why.
+
+After Ardon et al. (2021), "Affordance-Aware Handovers with Human Arm Mobility Constraints", on real kinematics. The names below
+are loaded when first used, so that importing this package costs nothing; they need the extra `mlnlite[handover]`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from mlnlite import MissingPart, Plugin
+
+if TYPE_CHECKING:
+    import click
+
+    from mlnlite.domains.handover.checks import Check as Check
+    from mlnlite.domains.handover.checks import five_checks as five_checks
+    from mlnlite.domains.handover.checks import violations as violations
+    from mlnlite.domains.handover.costs import Limits as Limits
+    from mlnlite.domains.handover.costs import appropriateness as appropriateness
+    from mlnlite.domains.handover.costs import reachability as reachability
+    from mlnlite.domains.handover.costs import safety as safety
+    from mlnlite.domains.handover.effort import Effort as Effort
+    from mlnlite.domains.handover.effort import effort_at as effort_at
+    from mlnlite.domains.handover.effort import effort_of as effort_of
+    from mlnlite.domains.handover.fields import Options as Options
+    from mlnlite.domains.handover.fields import cost_field as cost_field
+    from mlnlite.domains.handover.grasps import sample_grasps as sample_grasps
+    from mlnlite.domains.handover.ik import damped_least_squares as damped_least_squares
+    from mlnlite.domains.handover.methods import hand_over as hand_over
+    from mlnlite.domains.handover.mobility import MobilityLevel as MobilityLevel
+    from mlnlite.domains.handover.mobility import read_levels as read_levels
+    from mlnlite.domains.handover.objects import HandoverObject as HandoverObject
+    from mlnlite.domains.handover.objects import object_names as object_names
+    from mlnlite.domains.handover.objects import read_object as read_object
+    from mlnlite.domains.handover.optimise import Configuration as Configuration
+    from mlnlite.domains.handover.optimise import Handover as Handover
+    from mlnlite.domains.handover.optimise import optimise as optimise
+    from mlnlite.domains.handover.optimise import require as require
+    from mlnlite.domains.handover.pose import Pose as Pose
+    from mlnlite.domains.handover.receiver import Body as Body
+    from mlnlite.domains.handover.receiver import Receiver as Receiver
+    from mlnlite.domains.handover.receiver import read_receiver as read_receiver
+    from mlnlite.domains.handover.robots import Gripper as Gripper
+    from mlnlite.domains.handover.robots import Robot as Robot
+    from mlnlite.domains.handover.robots import read_robot as read_robot
+    from mlnlite.domains.handover.scene import Layout as Layout
+    from mlnlite.domains.handover.scene import Scene as Scene
+    from mlnlite.domains.handover.scene import make_scene as make_scene
+
+_HOMES = {
+    "checks": "Check five_checks violations",
+    "costs": "Limits appropriateness reachability safety",
+    "effort": "Effort effort_at effort_of",
+    "fields": "Options cost_field",
+    "grasps": "sample_grasps",
+    "ik": "damped_least_squares",
+    "methods": "hand_over",
+    "mobility": "MobilityLevel read_levels",
+    "objects": "HandoverObject object_names read_object",
+    "optimise": "Configuration Handover optimise require",
+    "pose": "Pose",
+    "receiver": "Body Receiver read_receiver",
+    "robots": "Gripper Robot read_robot",
+    "scene": "Layout Scene make_scene",
+}
+_PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split()}
+_PARTS = ("pinocchio", "coal", "trimesh", "scipy", "numpy", "numba", "pink", "matplotlib", "viser")
+
+
+def load(module: str) -> Any:
+    """A module of this package by its short name.
+
+    Raises:
+        MissingPart: a package of the extra is not installed.
+    """
+    try:
+        return import_module(f"{__name__}.{module}")
+    except ModuleNotFoundError as reason:
+        if reason.name is None or reason.name.split(".")[0] not in _PARTS:
+            raise
+        hint = 'pip install "mlnlite[handover]"'
+        raise MissingPart(f"the handover domain needs the package {reason.name!r}", hint=hint) from None
+
+
+def __getattr__(name: str) -> Any:
+    """Public names, on first use."""
+    if name in _PUBLIC:
+        return getattr(load(_PUBLIC[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Public names, for completion."""
+    return sorted((*_PUBLIC, "load", "plugin"))
+
+
+def _commands() -> click.Group:
+    from mlnlite.domains.handover.cli import handover
+
+    return handover
+
+
+plugin = Plugin(name="handover", summary="Where and how to hand an object over.", commands=_commands)

@@ -10,7 +10,15 @@ import pinocchio as pin
 from mlnlite.domains.handover.pose import FloatArray, locked
 from mlnlite.domains.handover.receiver import Receiver
 
-RADII = {"trunk": 0.125, "head": 0.10, "upper_arm": 0.048, "forearm": 0.038, "hand": 0.04, "thigh": 0.075, "shank": 0.055}
+RADII = {
+    "trunk": 0.125,
+    "head": 0.10,
+    "upper_arm": 0.048,
+    "forearm": 0.038,
+    "hand": 0.04,
+    "thigh": 0.075,
+    "shank": 0.055,
+}
 """[m] at a stature of 1.74 m; a choice that encloses a clothed body."""
 
 

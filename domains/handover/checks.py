@@ -74,7 +74,9 @@ def _reach(scene: Scene, found: Configuration) -> Check:
     effort = receiver_effort(scene, found)
     if effort is None:
         return Check("reach", False, f"out of reach at mobility {scene.receiver.level.name}")
-    return Check("reach", effort.share <= 1.0, f"{effort.total:.1f} N m, at most {100 * effort.share:.0f} % of strength")
+    return Check(
+        "reach", effort.share <= 1.0, f"{effort.arm:.1f} N m in the arm, at most {100 * effort.share:.0f} % of strength"
+    )
 
 
 def _affordance(scene: Scene, grasps: GraspSet, found: Configuration) -> Check:
@@ -119,7 +121,10 @@ def violations(scene: Scene, found: Configuration, options: Options | None = Non
         out.append("the tool is not turned as the grasp")
     if _least_distance(scene, grasps, found, options) < options.limits.safety:
         out.append("hand or face is too near")
-    if float(np.linalg.norm(found.human_grasp - scene.hand.position)) > options.limits.reach and options.distance == "point":
+    if (
+        float(np.linalg.norm(found.human_grasp - scene.hand.position)) > options.limits.reach
+        and options.distance == "point"
+    ):
         out.append("the hand would move too far")
     if options.receiver and not can_reach(scene.receiver, found.human_grasp):
         out.append("the receiver cannot reach it")

@@ -59,13 +59,18 @@ def make_world(robot: Robot, base: Pose, thing: HandoverObject, body: Sequence[C
     last = robot.model.njoints - 1
     links = robot.geometry.geometryObjects
     person = [_capsule_body(i, capsule, base) for i, capsule in enumerate(body)]
-    parts = [(pin.GeometryObject(f"object_{i}", last, place, shape), place) for i, (shape, place) in enumerate(_shapes(thing))]
+    parts = [
+        (pin.GeometryObject(f"object_{i}", last, place, shape), place)
+        for i, (shape, place) in enumerate(_shapes(thing))
+    ]
     foot = [link for link in links if link.parentJoint == 0]
     gripper = [link for link in links if link.parentJoint == last]
     arm, held = _arm(robot, person, parts)
     floating_thing = _floating([part for part, _ in parts], person + foot)
     capsules = np.array([[*capsule.start, *capsule.end, capsule.radius] for capsule in body]).reshape(-1, 7)
-    return World(robot, arm, floating_thing, _floating(gripper, person + foot), held, capsules, _hand_points(robot, gripper))
+    return World(
+        robot, arm, floating_thing, _floating(gripper, person + foot), held, capsules, _hand_points(robot, gripper)
+    )
 
 
 def _hand_points(robot: Robot, gripper: list[Any]) -> FloatArray:
@@ -81,9 +86,7 @@ def _hand_points(robot: Robot, gripper: list[Any]) -> FloatArray:
     return np.ascontiguousarray(np.concatenate(found))
 
 
-def _arm(
-    robot: Robot, person: list[Any], parts: list[tuple[Any, Any]]
-) -> tuple[Bodies, tuple[tuple[int, Any], ...]]:
+def _arm(robot: Robot, person: list[Any], parts: list[tuple[Any, Any]]) -> tuple[Bodies, tuple[tuple[int, Any], ...]]:
     geometry = robot.geometry.copy()
     links = list(range(geometry.ngeoms))
     people = [int(geometry.addGeometryObject(body)) for body in person]

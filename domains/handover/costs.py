@@ -104,7 +104,9 @@ def distances(points: Points, centres: FloatArray, rotations: FloatArray, kind: 
         shape = rotations.shape[:2]
         to_hand = np.broadcast_to(_from(points.hand, centres)[:, None], shape)
         to_face = np.broadcast_to(_from(points.face, centres)[:, None], shape)
-        return Distances(to_hand, to_face, gripper, _from(points.hand, rotations @ points.region_centre + centres[:, None]))
+        return Distances(
+            to_hand, to_face, gripper, _from(points.hand, rotations @ points.region_centre + centres[:, None])
+        )
     hand, face = (_in_object(place, centres, rotations) for place in (points.hand, points.face))
     tree = cKDTree(points.surface)
     to_hand = np.maximum(0.0, tree.query(hand)[0] - HAND_RADIUS)

@@ -28,7 +28,8 @@ class Effort:
     Attributes:
         q: posture, shape (8,) [rad].
         torque: of each joint, shape (8,) [N m].
-        total: sum of |torque| over the seven arm joints [N m].
+        total: sum of |torque| over the arm's joints and the trunk [N m].
+        arm: sum of |torque| over the seven arm joints [N m].
         norm: Euclidean norm over the arm joints [N m].
         peak: largest |torque| of an arm joint [N m].
         trunk: |torque| of the trunk's lean [N m].
@@ -38,6 +39,7 @@ class Effort:
     q: FloatArray
     torque: FloatArray
     total: float
+    arm: float
     norm: float
     peak: float
     trunk: float
@@ -64,7 +66,13 @@ def effort_of(receiver: Receiver, q: FloatArray, load: float = 0.0) -> Effort:
     torque = holding_torque(receiver, q, load)
     arm = np.abs(torque[TRUNK + 1 :])
     share = float((np.abs(torque) / receiver.strength).max())
-    summary = float(arm.sum()), float(np.linalg.norm(arm)), float(arm.max()), float(abs(torque[TRUNK]))
+    summary = (
+        float(np.abs(torque).sum()),
+        float(arm.sum()),
+        float(np.linalg.norm(arm)),
+        float(arm.max()),
+        float(abs(torque[TRUNK])),
+    )
     return Effort(locked(q), locked(torque), *summary, share)
 
 

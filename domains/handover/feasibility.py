@@ -78,7 +78,11 @@ def attempt(scene: Scene, grasps: GraspSet, grasp: int, pose: Pose, options: Opt
         return Attempt(None, 0, "collision")
     tools = _tools(scene, grasps, grasp, pose, options.approaches)
     if options.collisions:
-        tools = [(a, tool) for a, tool in tools if not touches(world.hand_points, tool.rotation, tool.position, world.capsules)]
+        tools = [
+            (a, tool)
+            for a, tool in tools
+            if not touches(world.hand_points, tool.rotation, tool.position, world.capsules)
+        ]
         if not tools or not thing_is_free(world, compose(inverse(scene.base, "base"), pose)):
             return Attempt(None, 0, "collision")
     if options.receiver and not can_reach(scene.receiver, human_grasp(scene, pose)):

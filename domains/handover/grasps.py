@@ -80,7 +80,9 @@ def _antipodal(thing: HandoverObject, width: float) -> tuple[FloatArray, Labels]
     exits = points - lengths[first, face][:, None] * normals
     outward = np.asarray(thing.mesh.face_normals)[face]
     held = (outward * -normals).sum(axis=1) >= 1.0 / np.sqrt(1.0 + FRICTION**2)
-    hidden = np.any([is_inside(part, exits + 1e-3 * outward) for part in thing.parts] or [np.zeros(len(exits), bool)], axis=0)
+    hidden = np.any(
+        [is_inside(part, exits + 1e-3 * outward) for part in thing.parts] or [np.zeros(len(exits), bool)], axis=0
+    )
     keep = held & ~hidden
     _, nearest = cKDTree(surface.points).query(exits[keep])
     contacts = np.stack([points[keep], exits[keep]], axis=1)

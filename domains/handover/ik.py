@@ -110,7 +110,12 @@ class DampedLeastSquares:
 
 
 def damped_least_squares(
-    chain: Chain, *, seed: int = 0, table: int = 20_000, starts: int = 12, tolerance: Tolerance | None = None,
+    chain: Chain,
+    *,
+    seed: int = 0,
+    table: int = 20_000,
+    starts: int = 12,
+    tolerance: Tolerance | None = None,
     position_only: bool = False,
 ) -> DampedLeastSquares:
     """Builds the solver and its table of `table` random configurations, about 0.1 s.

@@ -98,9 +98,7 @@ def _suited(scene: Scene, grasps: GraspSet, place: FloatArray, options: Options)
             yield rank, int(grasp), k, rotations[k]
 
 
-def _priced(
-    scene: Scene, grasps: GraspSet, candidate: _Candidate, held: Hold, options: Options
-) -> Configuration:
+def _priced(scene: Scene, grasps: GraspSet, candidate: _Candidate, held: Hold, options: Options) -> Configuration:
     """A candidate with its costs."""
     rank, grasp, k, rotation = candidate
     place = held.tool.position - rotation @ grasps.centres[grasp]

@@ -25,8 +25,7 @@ CATEGORIES = ("work_tool", "cleaning_tool", "crockery", "cooking_tool", "electro
 MATERIALS = ("plastic", "rubber", "fabric", "glass", "cardboard", "aluminium")
 TEXTURES = ("smooth", "bumpy", "slippery", "grainy", "fluffy")
 AFFORDANCES = tuple(
-    f"to_{verb}"
-    for verb in "contain pour clean hand_over write squeeze read shape stack shake screw clip cut".split()
+    f"to_{verb}" for verb in ["contain", "pour", "clean", "hand_over", "write", "squeeze", "read", "shape", "stack", "shake", "screw", "clip", "cut"]
 )
 N_POINTS = 600
 
@@ -202,13 +201,17 @@ def _mesh_shape(entry: dict[str, Any], where: str, folder: Path) -> _Shape:
     labels = np.full(len(points), len(boxes), dtype=np.int64)
     for i, (name, box) in reversed(list(enumerate(boxes.items()))):
         if np.shape(box) != (2, 3):
-            raise MlnError(f"{where}: region {name!r} is {box!r}, expected [[x, y, z], [x, y, z]]", hint="low, high [m]")
+            raise MlnError(
+                f"{where}: region {name!r} is {box!r}, expected [[x, y, z], [x, y, z]]", hint="low, high [m]"
+            )
         low, high = np.array(box, dtype=np.float64)
         labels[((scale * points >= low) & (scale * points <= high)).all(axis=1)] = i
     names = (*boxes, "rest") if (labels == len(boxes)).any() else tuple(boxes)
     empty = [name for i, name in enumerate(names) if not (labels == i).any()]
     if empty:
-        raise MlnError(f"{where}: no surface lies in the region {', '.join(empty)}", hint=f"the mesh spans {mesh.bounds}")
+        raise MlnError(
+            f"{where}: no surface lies in the region {', '.join(empty)}", hint=f"the mesh spans {mesh.bounds}"
+        )
     labels.setflags(write=False)
     mesh.apply_translation(-middle)
     mesh.apply_scale(scale)

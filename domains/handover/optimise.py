@@ -112,7 +112,7 @@ def optimise(scene: Scene, options: Options | None = None, *, exhaustive: bool =
     for rank, grasp in enumerate(ranked[: options.grasps]):
         fields.append(cost_field(scene, grasps, int(grasp), options))
         best, bound = _search(case, fields[-1])
-        stopped = best is None and np.isfinite(bound) or best is not None and bound < best[0]
+        stopped = (best is None and np.isfinite(bound)) or (best is not None and bound < best[0])
         if best is not None:
             found = _configuration(case, fields[-1], best, rank, float(values[grasp]))
             return _result(case, "limit" if stopped else "optimal", found, bound)

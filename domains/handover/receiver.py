@@ -146,7 +146,9 @@ def _append_trunk(model: pin.Model, joint: int, body: Body, figures: dict[str, A
     model.appendBodyToJoint(joint, pin.Inertia(other, middle, np.zeros((3, 3))), pin.SE3.Identity())
 
 
-def _append(model: pin.Model, joint: int, segment: dict[str, Any], scales: tuple[float, float], top: float = 0.0) -> None:
+def _append(
+    model: pin.Model, joint: int, segment: dict[str, Any], scales: tuple[float, float], top: float = 0.0
+) -> None:
     """Hangs a segment from `top` [m] above the joint: I = m L^2 diag(sagittal^2, transverse^2, longitudinal^2)."""
     mass, length = scales[0] * segment["mass"], scales[1] * segment["length"]
     inertia = mass * length**2 * np.diag(np.square(segment["gyration"]))

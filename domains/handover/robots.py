@@ -94,12 +94,16 @@ def read_robot(
         return _known_robot(name, known[name], gripper)
     path = Path(name)
     if path.suffix.lower() != ".urdf":
-        raise MlnError(f"unknown robot {name!r}; known: {', '.join(known)}, or the path of a .urdf file",
-                       hint=did_you_mean(name, list(known)))
+        raise MlnError(
+            f"unknown robot {name!r}; known: {', '.join(known)}, or the path of a .urdf file",
+            hint=did_you_mean(name, list(known)),
+        )
     try:
         text = path.read_text()
     except (OSError, UnicodeDecodeError) as reason:
-        raise MlnError(f"cannot read the robot file {name}: {reason}", hint="give the path of a URDF text file") from None
+        raise MlnError(
+            f"cannot read the robot file {name}: {reason}", hint="give the path of a URDF text file"
+        ) from None
     pose = base or pose_at(1.1, -0.15, 0.0, np.pi)
     both = (("standing", pose), ("seated", pose))
     model, geometry = _build(path.name, text, meshes)
@@ -115,7 +119,11 @@ def _known_robot(name: str, entry: dict[str, Any], gripper: Gripper | None) -> R
 
 
 def _robot(
-    name: str, built: tuple[pin.Model, pin.GeometryModel], tool: str, gripper: Gripper, bases: tuple[tuple[str, Pose], ...]
+    name: str,
+    built: tuple[pin.Model, pin.GeometryModel],
+    tool: str,
+    gripper: Gripper,
+    bases: tuple[tuple[str, Pose], ...],
 ) -> Robot:
     model, geometry = built
     if not model.existFrame(tool):

@@ -105,7 +105,9 @@ def _posture(receiver: Receiver, hand: FloatArray | None) -> FloatArray:
     if hand is None:
         return receiver.comfort
     if np.shape(hand) != (3,) or not np.isfinite(hand).all():
-        raise MlnError(f"the hand's position is {hand!r}, expected three finite numbers [m]", hint="x forward, y left, z up")
+        raise MlnError(
+            f"the hand's position is {hand!r}, expected three finite numbers [m]", hint="x forward, y left, z up"
+        )
     q = easiest_posture(receiver, np.asarray(hand, dtype=np.float64))
     if q is None:
         raise MlnError(

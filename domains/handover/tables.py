@@ -26,7 +26,9 @@ def read_table(path: str | Path | Traversable) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError) as reason:
         raise MlnError(f"cannot read {path}: {reason}", hint="give the path of a TOML text file") from None
     except tomllib.TOMLDecodeError as reason:
-        raise MlnError([Diagnostic("E801", f"{path}: not TOML: {reason}", hint="repair the line named above")]) from None
+        raise MlnError(
+            [Diagnostic("E801", f"{path}: not TOML: {reason}", hint="repair the line named above")]
+        ) from None
 
 
 def take(entry: Mapping[str, Any], key: str, kind: type | tuple[type, ...], where: str) -> Any:
@@ -54,4 +56,6 @@ def choose(word: str, known: Iterable[str], what: str) -> str:
     if word in words:
         return word
     near = did_you_mean(word, words)
-    raise MlnError(f"unknown {what} {word!r}; known: {', '.join(words)}", hint=near or f"choose one of the known {what}s")
+    raise MlnError(
+        f"unknown {what} {word!r}; known: {', '.join(words)}", hint=near or f"choose one of the known {what}s"
+    )
