@@ -244,7 +244,7 @@ def compiled(source: Source, cubes: Sequence[Cube], equalities: Sequence[Equal])
     kept = [*(["row"] if source.tabled else []), *map(atom_column, atoms)]
     kept += [equality_column(i) for i in range(len(open_equalities))]
     seen = set(source.keys).union(*(variables_of(source.formula.atoms[i].arguments) for i in atoms))
-    counted = not set(free) <= seen or not _always_open(source, atoms)
+    counted = not kept or not set(free) <= seen or not _always_open(source, atoms)
     final = Count(plan, tuple(kept)) if counted else Project(plan, tuple(kept))
     return Compiled(final, atoms, known, open_equalities, counted)
 
