@@ -83,6 +83,13 @@ class MissingPart(MlnError):
     """An optional package is needed; names what to install."""
 
 
+def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Diagnostics file by file and in the order of their places; those without a place last."""
+    listed = list(diagnostics)
+    files = {d.span.source.name: i for i, d in reversed(list(enumerate(listed))) if d.span}
+    return sorted(listed, key=lambda d: (files[d.span.source.name], d.span.start) if d.span else (len(listed), 0))
+
+
 def did_you_mean(word: str, known: Sequence[str]) -> str:
     """A hint with the nearest known words, or an empty text.
 

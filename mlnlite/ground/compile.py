@@ -237,7 +237,7 @@ def compiled(source: Source, cubes: Sequence[Cube], equalities: Sequence[Equal])
         plan = Union(tuple(Project(bindings(source, cube, free), columns) for cube in cubes))
     atoms = tuple(i for i in range(len(source.formula.atoms)) if AtomRef(i) not in known)
     for i in atoms:
-        plan = _with_atom(plan, source, i)
+        plan = with_atom(plan, source, i)
     open_equalities = tuple(e for e in equalities if e not in known)
     for i, equality in enumerate(open_equalities):
         plan = _with_equality(plan, i, equality)
@@ -276,7 +276,8 @@ def with_number(plan: Plan, evidence: Evidence, schema: AtomSchema, name: str) -
     return Compute(plan, name, tuple(terms.items()), constant)
 
 
-def _with_atom(plan: Plan, source: Source, index: int) -> Plan:
+def with_atom(plan: Plan, source: Source, index: int) -> Plan:
+    """Adds the column of atom `index`: its number, or `KNOWN_TRUE`, or `KNOWN_FALSE`."""
     schema = source.formula.atoms[index]
     has_facts = bool(len(source.evidence.facts[schema.predicate].truth))
     closed = source.is_closed(schema)

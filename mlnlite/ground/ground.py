@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,15 +12,15 @@ from mlnlite.engines.choose import engine_for
 from mlnlite.engines.plan import Column, Engine, Relation, Run
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
 from mlnlite.ground.assemble import Part, Piece, network_of
-from mlnlite.ground.compile import Compiled, Source, atom_column, compiled
+from mlnlite.ground.compile import Compiled, Source, atom_column, bindings, column, compiled, with_atom
 from mlnlite.ground.groups import Group, groups_of
 from mlnlite.ground.network import Network
 from mlnlite.ground.residual import Decided
 from mlnlite.ground.tables import completed, tables_of
 from mlnlite.model.evidence import Evidence
-from mlnlite.model.formulas import All, Any, Equal, Expression, Iff, Not
+from mlnlite.model.formulas import All, Any, AtomRef, Equal, Expression, Iff, Not
 from mlnlite.model.model import Model
-from mlnlite.model.propositional import cubes, without_quantifiers
+from mlnlite.model.propositional import Cube, cubes, without_quantifiers
 from mlnlite.model.templates import Template
 
 Int64 = NDArray[np.int64]
@@ -91,22 +91,48 @@ def _grounded(source: Source, template: Template, run: Run) -> Part:
         cause = error.diagnostics[0]
         message = f"{template.name} cannot be grounded: {cause.message}"
         raise LimitReached([Diagnostic("E402", message, template.span, cause.hint)]) from error
-    return _verified(template, _part(source, plan, rows, groups, lists_true=lists_true))
-
-
-def _verified(template: Template, part: Part) -> Part:
+    part = _part(source, plan, rows, groups, lists_true=lists_true)
     if template.hard and (part.decided_false > 0).any():
-        hint = "one of the two is wrong: change the facts, or give the formula a weight"
-        message = f"the evidence makes {template.name} false, which is hard: {template.text}"
-        raise Contradiction([Diagnostic("E403", message, template.span, hint)])
+        raise _violated(template, violation(source, false, run))
     return part
+
+
+def _violated(template: Template, where: str) -> Contradiction:
+    hint = "one of the two is wrong: change the facts, or give the formula a weight"
+    message = f"the evidence makes {template.name} false, which is hard: {template.text}{where}"
+    return Contradiction([Diagnostic("E403", message, template.span, hint)])
+
+
+def violation(source: Source, false: Sequence[Cube], run: Run) -> str:
+    """A binding for which evidence makes a formula false, as text: ` (x = Anna)`."""
+    for cube in false:
+        atoms = [p.index for p in cube if isinstance(p, AtomRef)]
+        plan = bindings(source, cube, source.formula.free)
+        for index in atoms:
+            plan = with_atom(plan, source, index)
+        rows = run(plan)
+        n_rows = len(next(iter(rows.values()))) if rows else 0
+        known = np.all([rows[atom_column(i)] < 0 for i in atoms], axis=0) if atoms else np.ones(n_rows, bool)
+        for row in np.flatnonzero(known)[:1]:
+            return _binding_text(source, {v: int(rows[column(v)][row]) for v in source.formula.free})
+    return ""
+
+
+def _binding_text(source: Source, binding: dict[int, int]) -> str:
+    variables = source.formula.variables
+    texts = [
+        f"{variables[v].name} = {source.evidence.types[variables[v].type].constants[c]}" for v, c in binding.items()
+    ]
+    return f" ({', '.join(texts)})" if texts else ""
 
 
 def _constant(source: Source, template: Template, *, truth: bool) -> Part:
     """A formula that is always true, or never."""
     every = np.full(source.n_rows, _groundings_of_a_row(source), np.int64)
     none = np.zeros_like(every)
-    return _verified(template, Part((), every, none) if truth else Part((), none, every))
+    if template.hard and not truth:
+        raise _violated(template, "")
+    return Part((), every, none) if truth else Part((), none, every)
 
 
 def _equalities(expression: Expression) -> Iterator[Equal]:

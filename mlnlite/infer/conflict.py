@@ -31,8 +31,8 @@ def contradiction(network: Network) -> Contradiction:
         what = "no world satisfies this hard formula together with the evidence"
     hint = "correct the evidence, or give one of them a finite weight"
     return Contradiction(
-        [Diagnostic("E301", f"{t.name}: {t.text}: {what}", t.span, hint if t is named[-1] else "") for t in named]
-        or [Diagnostic("E301", "no world is possible", hint="look for functional predicates without a possible value")]
+        [Diagnostic("E405", f"{t.name}: {t.text}: {what}", t.span, hint if t is named[-1] else "") for t in named]
+        or [Diagnostic("E405", "no world is possible", hint="look for functional predicates without a possible value")]
     )
 
 

@@ -10,7 +10,7 @@ from typing import assert_never
 
 import numpy as np
 
-from mlnlite.errors import Diagnostic, ModelMistake, did_you_mean
+from mlnlite.errors import Diagnostic, ModelMistake, did_you_mean, in_order
 from mlnlite.model.formulas import Formula
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Predicate, Type
@@ -56,7 +56,7 @@ def check(program: tree.Program) -> Model:
     if not state.predicates and not state.mistakes:
         state.mistakes.append(_nothing_declared(program))
     if state.mistakes:
-        raise ModelMistake(state.mistakes)
+        raise ModelMistake(in_order(state.mistakes))
     _warn(state)
     return Model(_types(state), state.predicates, tuple(state.templates), program.dialect, tuple(state.warnings))
 
@@ -122,7 +122,7 @@ def _check_formula(statement: tree.FormulaStatement, state: _Check) -> None:
     formula = typer.typed(statement.formula)
     weight = np.inf if statement.hard else np.nan
     if statement.weight is not None:
-        weight = checked_weight(statement.weight, state.mistakes)
+        weight = checked_weight(statement.weight, statement.span, state.mistakes)
     if formula is None:
         return
     state.used.update(a.predicate for a in atoms_of(statement.formula))
@@ -164,9 +164,10 @@ def _check_table(statement: tree.FormulaTable, state: _Check) -> None:
     typer = FormulaTyper(state.predicates, state.constants, state.mistakes)
     formula = typer.typed(statement.formula)
     cache: dict[tree.WeightExpression, float] = {}
-    for weight in statement.weights:
+    for row, weight in enumerate(statement.weights):
         if weight not in cache:
-            cache[weight] = checked_weight(weight, state.mistakes)
+            span = statement.spans[row] if statement.spans else statement.span
+            cache[weight] = checked_weight(weight, span, state.mistakes)
     if formula is None:
         return
     n_rows = len(statement.weights)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean
+from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean, in_order
 from mlnlite.model.evidence import Evidence, Facts
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Predicate, Type
@@ -77,7 +77,7 @@ def check_evidence(
     n_databases = 1 if together else first
     facts = {name: _sorted(name, reading) for name in model.predicates}
     if reading.mistakes:
-        raise EvidenceMistake(reading.mistakes)
+        raise EvidenceMistake(in_order(reading.mistakes))
     result_types = {name: Type(name, tuple(index)) for name, index in reading.types.items()}
     present = _present(model, result_types, facts, n_databases, reading)
     names = tuple(f"{s.name}#{i + 1}" for s, p in zip(sources, programs, strict=True) for i in range(p.n_databases))

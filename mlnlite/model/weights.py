@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import assert_never
 
 from mlnlite.errors import Diagnostic
+from mlnlite.source import Span
 from mlnlite.syntax.tree import Arithmetic, Call, Number, WeightExpression
 
 LOG_OF_ZERO = -100.0
@@ -15,20 +16,48 @@ LOG_OF_ZERO = -100.0
 
 def logx(p: float) -> float:
     """Natural logarithm, with `LOG_OF_ZERO` at zero."""
-    return LOG_OF_ZERO if p == 0 else math.log(p)
+    return LOG_OF_ZERO if p == 0 else log(p)
+
+
+def log(x: float) -> float:
+    """Natural logarithm.
+
+    Raises:
+        ValueError: if `x` is not positive.
+    """
+    if not x > 0:
+        raise ValueError(f"log needs a positive number, found {x:g}")
+    return math.log(x)
 
 
 def logit(p: float) -> float:
-    """`log(p / (1 - p))`."""
+    """`log(p / (1 - p))`.
+
+    Raises:
+        ValueError: if `p` is not between 0 and 1.
+    """
+    if not 0 < p < 1:
+        raise ValueError(f"logit needs a probability between 0 and 1, found {p:g}")
     return math.log(p / (1 - p))
 
 
-FUNCTIONS: Mapping[str, Callable[..., float]] = {
+def sqrt(x: float) -> float:
+    """Square root.
+
+    Raises:
+        ValueError: if `x` is negative.
+    """
+    if x < 0:
+        raise ValueError(f"sqrt needs a number that is not negative, found {x:g}")
+    return math.sqrt(x)
+
+
+FUNCTIONS: Mapping[str, Callable[[float], float]] = {
     "logx": logx,
-    "log": math.log,
-    "ln": math.log,
+    "log": log,
+    "ln": log,
     "exp": math.exp,
-    "sqrt": math.sqrt,
+    "sqrt": sqrt,
     "logit": logit,
     "abs": abs,
 }
@@ -56,20 +85,32 @@ def evaluate(weight: WeightExpression) -> float:
         case Call(function, arguments):
             if function not in FUNCTIONS:
                 raise ValueError(f"there is no function {function} for weights; there are {', '.join(FUNCTIONS)}")
-            return float(FUNCTIONS[function](*map(evaluate, arguments)))
+            if len(arguments) != 1:
+                raise ValueError(f"{function} takes one number, found {len(arguments)}")
+            return FUNCTIONS[function](evaluate(arguments[0]))
         case _:
             assert_never(weight)
 
 
-def checked_weight(weight: WeightExpression, mistakes: list[Diagnostic]) -> float:
-    """Value of a weight expression; a mistake is added to `mistakes` and gives 0."""
+def checked_weight(weight: WeightExpression, span: Span | None, mistakes: list[Diagnostic]) -> float:
+    """Value of a weight expression; a mistake is added to `mistakes` and gives 0.
+
+    Args:
+        weight: the expression.
+        span: of its formula, for an expression that has none of its own.
+        mistakes: what is wrong so far.
+    """
+    span = weight.span or span
     try:
         value = evaluate(weight)
-    except (ValueError, ZeroDivisionError, OverflowError, TypeError) as error:
-        mistakes.append(Diagnostic("E220", f"this weight has no value: {error}", weight.span))
+    except ZeroDivisionError:
+        mistakes.append(Diagnostic("E220", "this weight has no value: it divides by zero", span))
+        return 0.0
+    except (ValueError, OverflowError) as error:
+        mistakes.append(Diagnostic("E220", f"this weight has no value: {error}", span))
         return 0.0
     if math.isnan(value) or value == -math.inf:
         hint = "a formula that must never hold is written as its negation with a final dot"
-        mistakes.append(Diagnostic("E221", f"a weight cannot be {value}", weight.span, hint))
+        mistakes.append(Diagnostic("E221", f"a weight cannot be {value}", span, hint))
         return 0.0
     return value
