@@ -17,9 +17,9 @@ demo: $(VENV)/.installed  ## learn the example model, then ask it
 	@mkdir -p $(OUT)
 	$(BIN)/mlnlite learn $(EXAMPLES)/handover.mln $(EXAMPLES)/handover.db --predict graspRegion,handover -o $(OUT)/handover.mln
 	@echo
-	$(BIN)/mlnlite query $(OUT)/handover.mln -e $(EXAMPLES)/jug.db -q graspRegion,handover
+	$(BIN)/mlnlite query $(OUT)/handover.mln -e $(EXAMPLES)/jug.db -q graspRegion,handover --closed-world all
 	@echo
-	$(BIN)/mlnlite query $(OUT)/handover.mln -e $(EXAMPLES)/jug.db -q graspRegion,handover --task map
+	$(BIN)/mlnlite query $(OUT)/handover.mln -e $(EXAMPLES)/jug.db -q graspRegion,handover --closed-world all --task map
 	@echo
 	@echo "The learnt model is $(OUT)/handover.mln; what it was learnt from and asked about is in $(EXAMPLES)/."
 

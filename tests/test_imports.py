@@ -1,0 +1,24 @@
+"""`mlnlite --help` starts fast: nothing heavy is imported before a command needs it."""
+
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = {"numpy", "scipy", "duckdb", "lark", "numba", "networkx", "highspy", "pysat", "pytoulbar2", "rich", "pandas"}
+
+
+def imported(*arguments):
+    command = [sys.executable, "-X", "importtime", *arguments]
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    lines = (line for line in result.stderr.splitlines() if line.startswith("import time:"))
+    return {line.rpartition("|")[2].strip().partition(".")[0] for line in lines}
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["query", "--help"], ["learn", "--help"]])
+def test_help_loads_nothing_heavy(arguments):
+    assert imported("-m", "mlnlite", *arguments) & HEAVY == set()
+
+
+def test_the_package_loads_nothing_heavy():
+    assert imported("-c", "import mlnlite; mlnlite.MlnError") & HEAVY == set()
