@@ -1,7 +1,8 @@
-"""Robot-to-human handovers that mind affordances and arm mobility: where to hand an object over, how to hold it, and why.
+"""Robot-to-human handovers that mind affordances and arm mobility: where to hand an object over, how to hold it, why.
 
-After Ardon et al. (2021), "Affordance-Aware Handovers with Human Arm Mobility Constraints", on real kinematics. The names below
-are loaded when first used, so that importing this package costs nothing; they need the extra `mlnlite[handover]`.
+After Ardon et al. (2021), "Affordance-Aware Handovers with Human Arm Mobility Constraints", on real kinematics. The
+names below are loaded when first used, so that importing this package costs nothing; they need the extra
+`mlnlite[handover]`.
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ _PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split(
 _PARTS = ("pinocchio", "coal", "trimesh", "scipy", "numpy", "numba", "pink", "matplotlib", "viser")
 
 
-def load(module: str) -> Any:
+def load(module: str) -> Any:  # noqa: ANN401 - a module is what its user knows it to be
     """A module of this package by its short name.
 
     Raises:
@@ -84,7 +85,7 @@ def load(module: str) -> Any:
         raise MissingPart(f"the handover domain needs the package {reason.name!r}", hint=hint) from None
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Public names, on first use."""
     if name in _PUBLIC:
         return getattr(load(_PUBLIC[name]), name)

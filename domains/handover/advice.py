@@ -58,7 +58,7 @@ def _far(fields: Sequence[CostField], options: Options) -> Diagnostic | None:
     if best <= options.limits.reach:
         return None
     return Diagnostic(
-        "E812", f"reach: every voxel asks the hand to move more than {options.limits.reach:.3f} m; the nearest {best:.3f} m",
+        "E812", f"reach: every voxel is more than {options.limits.reach:.3f} m from the hand; the nearest {best:.3f} m",
         hint=f"allow a reach of {best:.3f} m, or move the voxel map to the receiver's hand",
     )  # fmt: skip
 
@@ -91,7 +91,7 @@ def _unsolved(scene: Scene, refused: Mapping[str, int], options: Options) -> Dia
     n = sum(refused.get(name, 0) for name in BLAMES)
     message, hint = {
         "receiver": (f"receiver: at mobility {level} the arm reaches {{}} of {n} candidates not",
-                     "centre the voxel map on the receiver's hand, or plan with `receiver=False` to ask of the trunk more"),
+                     "centre the voxel map on the receiver's hand, or plan with `receiver=False`"),
         "kinematics": (f"robot: {robot} has no inverse kinematics for {{}} of {n} candidates",
                        "move the robot's base, use more orientations, grasps or approaches"),
         "collision": (f"collision: {robot}, object and receiver cannot stay apart in {{}} of {n} candidates",

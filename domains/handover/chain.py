@@ -1,6 +1,7 @@
 """A serial arm as numbers: a Pinocchio model in, the table of its joints out, with kinematics in plain NumPy.
 
-The compiled solver reads this table; the forward kinematics here are the independent check of Pinocchio's and of the kernel's.
+The compiled solver reads this table; the forward kinematics here are the independent check of Pinocchio's and of the
+kernel's.
 """
 
 from __future__ import annotations
@@ -86,8 +87,8 @@ def _joint_motion(row: FloatArray, q: FloatArray) -> FloatArray:
 def reach_bound(chain: Chain) -> tuple[FloatArray, FloatArray, float]:
     """A sphere that no pose can leave: necessary for inverse kinematics, and cheap.
 
-    The origin of the last joint does not move with it, so its place follows from the tool's pose alone. It is never farther
-    from the first joint's origin than the sum of the link lengths between (plus the travel of sliding joints).
+    The origin of the last joint does not move with it, so its place follows from the tool's pose alone. It is never
+    farther from the first joint's origin than the sum of the link lengths between (plus the travel of sliding joints).
 
     Returns:
         Place of the last joint's origin in the tool frame (3,) [m], centre (3,) [m] in the base, radius [m].

@@ -1,6 +1,7 @@
 """Five checks of a configuration, as public robot-to-human benchmarks make them, and a re-check of every constraint.
 
-Nothing is taken from the search: poses are recomputed from the robot's joints by Pinocchio and distances from the poses.
+Nothing is taken from the search: poses are recomputed from the robot's joints by Pinocchio and distances from the
+poses.
 """
 
 from __future__ import annotations

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import coal
 import numpy as np
@@ -49,7 +48,7 @@ class World:
     arm: Bodies
     thing: Bodies
     hand: Bodies
-    held: tuple[tuple[int, Any], ...]
+    held: tuple[tuple[int, pin.SE3], ...]
     capsules: FloatArray
     hand_points: FloatArray
 
@@ -73,7 +72,7 @@ def make_world(robot: Robot, base: Pose, thing: HandoverObject, body: Sequence[C
     )
 
 
-def _hand_points(robot: Robot, gripper: list[Any]) -> FloatArray:
+def _hand_points(robot: Robot, gripper: list[pin.GeometryObject]) -> FloatArray:
     """A 3x3x5 grid inside each box of the gripper and along each other body's axis, in the tool."""
     grid = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], np.linspace(-1, 1, 5)), axis=-1).reshape(-1, 3)
     to_tool = np.linalg.inv(robot.chain.table[-1, PLACEMENT].reshape(4, 4))
@@ -86,7 +85,9 @@ def _hand_points(robot: Robot, gripper: list[Any]) -> FloatArray:
     return np.ascontiguousarray(np.concatenate(found))
 
 
-def _arm(robot: Robot, person: list[Any], parts: list[tuple[Any, Any]]) -> tuple[Bodies, tuple[tuple[int, Any], ...]]:
+def _arm(
+    robot: Robot, person: list[pin.GeometryObject], parts: list[tuple[pin.GeometryObject, pin.SE3]]
+) -> tuple[Bodies, tuple[tuple[int, pin.SE3], ...]]:
     geometry = robot.geometry.copy()
     links = list(range(geometry.ngeoms))
     people = [int(geometry.addGeometryObject(body)) for body in person]
@@ -97,7 +98,7 @@ def _arm(robot: Robot, person: list[Any], parts: list[tuple[Any, Any]]) -> tuple
     return _bodies(robot.model, geometry, pairs), held
 
 
-def _floating(moving: list[Any], fixed: list[Any]) -> Bodies:
+def _floating(moving: list[pin.GeometryObject], fixed: list[pin.GeometryObject]) -> Bodies:
     """Bodies on a free joint, in the frame that they have on theirs, against fixed ones."""
     model, geometry = pin.Model(), pin.GeometryModel()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")
@@ -106,7 +107,7 @@ def _floating(moving: list[Any], fixed: list[Any]) -> Bodies:
     return _bodies(model, geometry, _products(afloat, still))
 
 
-def _copied(geometry: pin.GeometryModel, body: Any, joint: int) -> int:
+def _copied(geometry: pin.GeometryModel, body: pin.GeometryObject, joint: int) -> int:
     copy = pin.GeometryObject(body.name, joint, body.placement, body.geometry)
     return int(geometry.addGeometryObject(copy))
 
@@ -122,7 +123,7 @@ def _products(first: Sequence[int], second: Sequence[int]) -> list[tuple[int, in
     return [(a, b) for a in first for b in second]
 
 
-def _capsule_body(index: int, capsule: Capsule, base: Pose) -> Any:
+def _capsule_body(index: int, capsule: Capsule, base: Pose) -> pin.GeometryObject:
     ends = transform_points(inverse(base, "base"), np.stack([capsule.start, capsule.end]))
     length = float(np.linalg.norm(ends[1] - ends[0]))
     shape = coal.Capsule(capsule.radius, length) if length > 1e-6 else coal.Sphere(capsule.radius)
@@ -130,7 +131,7 @@ def _capsule_body(index: int, capsule: Capsule, base: Pose) -> Any:
     return pin.GeometryObject(f"person_{capsule.name}_{index}", 0, pin.SE3(turn.matrix(), ends.mean(axis=0)), shape)
 
 
-def _shapes(thing: HandoverObject) -> list[tuple[Any, Any]]:
+def _shapes(thing: HandoverObject) -> list[tuple[coal.CollisionGeometry, pin.SE3]]:
     """Collision shapes of an object with their placements in it; tubes count as full."""
     if thing.parts:
         return [(_shape(part), pin.SE3(part.pose.rotation, part.pose.position)) for part in thing.parts]
@@ -143,7 +144,7 @@ def _shapes(thing: HandoverObject) -> list[tuple[Any, Any]]:
     return [(model.convex, pin.SE3.Identity())]
 
 
-def _shape(part: Part) -> Any:
+def _shape(part: Part) -> coal.CollisionGeometry:
     size = part.size
     if part.kind == "box":
         return coal.Box(*size)

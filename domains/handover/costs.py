@@ -1,7 +1,8 @@
 """The three costs of Ardon et al. (2021): places in, numbers over all voxels and orientations out. No robot, no search.
 
-Printed form: distances between points. Documented variant: `surface`, where the distances to hand and face are those of the
-object's surface to spheres of `HAND_RADIUS` and `FACE_RADIUS`, and the reach is to the nearest point of the human region.
+Printed form: distances between points. Documented variant: `surface`, where the distances to hand and face are those
+of the object's surface to spheres of `HAND_RADIUS` and `FACE_RADIUS`, and the reach is to the nearest point of the
+human region.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def appropriateness(grasps: FloatArray, region: FloatArray) -> FloatArray:
 
 
 def safety(to_hand: FloatArray, to_face: FloatArray, gripper_to_hand: FloatArray, threshold: float) -> FloatArray:
-    """Equation 3: `C_S = d(O, hand) + d(O, face) + d(EE, hand)`, zero where any is under the threshold; to be maximised.
+    """Equation 3: `C_S = d(O, hand) + d(O, face) + d(EE, hand)`, 0 where any is under the threshold; to be maximised.
 
     Args:
         to_hand: object to hand, any shape [m].
@@ -111,14 +112,17 @@ def distances(points: Points, centres: FloatArray, rotations: FloatArray, kind: 
     tree = cKDTree(points.surface)
     to_hand = np.maximum(0.0, tree.query(hand)[0] - HAND_RADIUS)
     to_face = np.maximum(0.0, tree.query(face)[0] - FACE_RADIUS)
-    return Distances(to_hand, to_face, np.maximum(0.0, gripper - HAND_RADIUS), cKDTree(points.region).query(hand)[0])
+    to_grasp = np.asarray(cKDTree(points.region).query(hand)[0], dtype=np.float64)
+    return Distances(to_hand, to_face, np.maximum(0.0, gripper - HAND_RADIUS), to_grasp)
 
 
 def _from(place: FloatArray, others: FloatArray) -> FloatArray:
     difference = others - place
-    return np.sqrt(np.einsum("...i,...i->...", difference, difference))
+    length: FloatArray = np.sqrt(np.einsum("...i,...i->...", difference, difference))
+    return length
 
 
 def _in_object(place: FloatArray, centres: FloatArray, rotations: FloatArray) -> FloatArray:
     """A place of the world in the object's frame, shape (V, K, 3) [m]: R^T (place - centre)."""
-    return np.einsum("vkji,vj->vki", rotations, place - centres)
+    local: FloatArray = np.einsum("vkji,vj->vki", rotations, place - centres)
+    return local

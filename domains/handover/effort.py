@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
-from scipy.optimize import minimize
+from scipy.optimize import NonlinearConstraint, minimize
 
 from mlnlite.domains.handover.ik import DampedLeastSquares, IkSolution, Tolerance, damped_least_squares
 from mlnlite.domains.handover.pose import FloatArray, locked
@@ -79,8 +79,9 @@ def effort_of(receiver: Receiver, q: FloatArray, load: float = 0.0) -> Effort:
 def easiest_posture(receiver: Receiver, place: FloatArray, load: float = 0.0) -> FloatArray | None:
     """The posture with the palm at `place`, shape (3,) [m], that asks least of the joints; None if out of reach.
 
-    Minimises `sum_i (tau_i(q) / strength_i)^2 + 1e-3 |q - comfort|^2` subject to `palm(q) = place` and the level's ranges of
-    motion, by sequential quadratic programming from an inverse-kinematics solution near the comfortable posture.
+    Minimises `sum_i (tau_i(q) / strength_i)^2 + 1e-3 |q - comfort|^2` subject to `palm(q) = place` and the level's
+    ranges of motion, by sequential quadratic programming from an inverse-kinematics solution near the comfortable
+    posture.
     """
     start = _reach(receiver, place)
     return locked(_minimise(receiver, start.q, np.asarray(place), load)) if start.found else None
@@ -119,7 +120,7 @@ def _minimise(receiver: Receiver, start: FloatArray, place: FloatArray, load: fl
         return np.array(pin.computeFrameJacobian(model, data, q, palm, pin.LOCAL_WORLD_ALIGNED))[:3]
 
     bounds = list(zip(receiver.chain.lower, receiver.chain.upper, strict=True))
-    held = {"type": "eq", "fun": gap, "jac": gap_slope}
+    held = NonlinearConstraint(gap, 0.0, 0.0, jac=gap_slope)
     found = minimize(cost, start, jac=True, bounds=bounds, constraints=[held], method="SLSQP",
                      options={"maxiter": 60, "ftol": 1e-8})  # fmt: skip
     q = np.clip(found.x, receiver.chain.lower, receiver.chain.upper)
@@ -127,7 +128,7 @@ def _minimise(receiver: Receiver, start: FloatArray, place: FloatArray, load: fl
 
 
 def _torque_slope(receiver: Receiver, data: pin.Data, q: FloatArray, load: float) -> FloatArray:
-    """Derivative of the holding torque by q, shape (8, 8) [N m/rad]: analytic for the body, Hessian row for the load."""
+    """Derivative of the holding torque by q, shape (8, 8) [N m/rad]: that of gravity, and of the load's lever."""
     model = receiver.model
     slope = np.array(pin.computeGeneralizedGravityDerivatives(model, data, q))
     if load:

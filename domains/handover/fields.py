@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ class Options:
 
     orientations: int = 8
     distance: Distance = "point"
-    limits: Limits = Limits()
+    limits: Limits = field(default_factory=Limits)
     grasps: int = 6
     approaches: int = 4
     collisions: bool = True
@@ -88,7 +88,7 @@ def cost_points(scene: Scene, grasp: FloatArray) -> Points:
 
 
 def presented_direction(thing: HandoverObject, region: int) -> FloatArray:
-    """Unit vector in the object, shape (3,), from its centre to the human region, or the region's mean normal if that is its centre."""
+    """Unit vector in the object, shape (3,), from its centre to the human region; its mean normal if that is no way."""
     centre = region_centre(thing, region)
     if np.linalg.norm(centre) < 0.005:
         centre = thing.surface.normals[thing.surface.labels == region].mean(axis=0)

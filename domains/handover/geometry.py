@@ -52,6 +52,7 @@ class Surface:
 def part_mesh(part: Part) -> trimesh.Trimesh:
     """The mesh of a part in the frame of the object [m]."""
     size = part.size
+    mesh: trimesh.Trimesh
     if part.kind == "box":
         mesh = trimesh.creation.box(extents=size)
     elif part.kind == "cylinder":
@@ -85,6 +86,14 @@ def is_inside(part: Part, points: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(inside, dtype=np.bool_)
 
 
+def is_hidden(parts: tuple[Part, ...], points: FloatArray) -> NDArray[np.bool_]:
+    """Which points, shape (n, 3) [m], lie inside any of the parts; shape (n,)."""
+    hidden = np.zeros(len(points), dtype=np.bool_)
+    for part in parts:
+        hidden |= is_inside(part, points)
+    return hidden
+
+
 def sample_mesh(mesh: trimesh.Trimesh, n: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """`n` points, uniform by area, with the normals of their faces; each of shape (n, 3) [m]."""
     corners = np.asarray(mesh.triangles)
@@ -107,8 +116,7 @@ def sample_parts(parts: tuple[Part, ...], n: int, rng: np.random.Generator) -> S
     for part, mesh in zip(parts, meshes, strict=True):
         points, normals = sample_mesh(mesh, max(40, round(n * np.sqrt(mesh.area) / total)), rng)
         outside = points + 1e-3 * normals
-        free = ~np.any([is_inside(other, outside) for other in parts if other is not part] or [False], axis=0)
-        free = np.broadcast_to(free, len(points))
+        free = ~is_hidden(tuple(other for other in parts if other is not part), outside)
         found.append((points[free], normals[free], _labels(part, points[free])))
     points, normals, labels = (np.concatenate(columns) for columns in zip(*found, strict=True))
     labels.setflags(write=False)

@@ -1,7 +1,8 @@
 """Robot grasps: an object and a gripper in, antipodal parallel-jaw grasps out.
 
-A ray from a surface point against its normal leaves the object at a second point; the two make a grasp if the line between
-them lies in both friction cones (Nguyen 1988) and fits between the jaws. The approach is free about the closing axis; approaches whose fingers or palm would cut the object are left out.
+A ray from a surface point against its normal leaves the object at a second point; the two make a grasp if the line
+between them lies in both friction cones (Nguyen 1988) and fits between the jaws. The approach is free about the
+closing axis; approaches whose fingers or palm would cut the object are left out.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from mlnlite.domains.handover.geometry import Labels, is_inside
+from mlnlite.domains.handover.geometry import Labels, is_hidden
 from mlnlite.domains.handover.objects import HandoverObject
 from mlnlite.domains.handover.pose import FloatArray, locked
 from mlnlite.domains.handover.robots import Gripper
@@ -72,7 +73,7 @@ def _spread(labels: Labels, n: int, rng: np.random.Generator) -> Labels:
 
 
 def _antipodal(thing: HandoverObject, width: float) -> tuple[FloatArray, Labels]:
-    """Contacts (m, 2, 3) [m] and their regions (m, 2): surface points and where the ray against their normal leaves the object."""
+    """Contacts (m, 2, 3) [m] and their regions (m, 2): surface points and where the ray through the object ends."""
     surface, triangles = thing.surface, np.asarray(thing.mesh.triangles)
     lengths = _exits(surface.points, -surface.normals, triangles)
     first, face = np.nonzero((lengths > 1.5e-3) & (lengths <= width))
@@ -80,9 +81,7 @@ def _antipodal(thing: HandoverObject, width: float) -> tuple[FloatArray, Labels]
     exits = points - lengths[first, face][:, None] * normals
     outward = np.asarray(thing.mesh.face_normals)[face]
     held = (outward * -normals).sum(axis=1) >= 1.0 / np.sqrt(1.0 + FRICTION**2)
-    hidden = np.any(
-        [is_inside(part, exits + 1e-3 * outward) for part in thing.parts] or [np.zeros(len(exits), bool)], axis=0
-    )
+    hidden = is_hidden(thing.parts, exits + 1e-3 * outward)
     keep = held & ~hidden
     _, nearest = cKDTree(surface.points).query(exits[keep])
     contacts = np.stack([points[keep], exits[keep]], axis=1)

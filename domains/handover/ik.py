@@ -1,7 +1,7 @@
 """Inverse kinematics: a chain and a pose of its tool in, a configuration inside the limits out.
 
-A solver is a pure function of its settings and the target: seeded when it is built, limited in steps and never in time, so
-a busy machine gives the same answer as an idle one.
+A solver is a pure function of its settings and the target: seeded when it is built, limited in steps and never in
+time, so a busy machine gives the same answer as an idle one.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ class IkSolver(Protocol):
 class DampedLeastSquares:
     """Levenberg-Marquardt with joint clamping, from the nearest of tabulated configurations.
 
-    Each step solves `dq = J^T (J J^T + (mu + nu |e|^2) I)^-1 e` (Nakamura & Hanafusa 1986; error-dependent damping after
-    Sugihara 2011) and clamps to the limits. Starts are the configurations, of a seeded table over the joint ranges, whose
-    tool poses are nearest to the target.
+    Each step solves `dq = J^T (J J^T + (mu + nu |e|^2) I)^-1 e` (Nakamura & Hanafusa 1986; error-dependent damping
+    after Sugihara 2011) and clamps to the limits. Starts are the configurations, of a seeded table over the joint
+    ranges, whose tool poses are nearest to the target.
 
     Attributes:
         chain: the arm.

@@ -1,6 +1,7 @@
 """Damped least squares on a joint table, compiled. In: table, target, starts, settings. Out: configuration and counts.
 
-The plain-Python twin is in `tests/handover/ik_twin.py`. Only arithmetic, no clock, no chance: equal inputs give equal bits.
+The plain-Python twin is in `tests/handover/ik_twin.py`. Only arithmetic, no clock, no chance: equal inputs give equal
+bits.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from numba import njit
 from mlnlite.domains.handover.pose import FloatArray
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def forward(table: FloatArray, q: FloatArray, frames: FloatArray) -> None:
     """Writes the joint frames after their motion to `frames[:n]` and the tool's to `frames[n]`, each 3x4 [m]."""
     n = len(q)
@@ -45,7 +46,7 @@ def forward(table: FloatArray, q: FloatArray, frames: FloatArray) -> None:
         frames[i, :, 3] = p
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def pose_error(now: FloatArray, target: FloatArray, error: FloatArray) -> tuple[float, float]:
     """Writes position error [m] and rotation vector [rad] from `now` to `target`; returns their norms."""
     e = np.empty((3, 3))
@@ -61,7 +62,7 @@ def pose_error(now: FloatArray, target: FloatArray, error: FloatArray) -> tuple[
     return np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2), angle
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def jacobian(table: FloatArray, frames: FloatArray, weight: float, out: FloatArray) -> None:
     """Writes the Jacobian of the tool (6 x n): linear rows [m], angular rows times `weight` [m/rad]."""
     n = out.shape[1]
@@ -79,7 +80,7 @@ def jacobian(table: FloatArray, frames: FloatArray, weight: float, out: FloatArr
         out[3, i], out[4, i], out[5, i] = weight * ax, weight * ay, weight * az
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def damped_step(j: FloatArray, error: FloatArray, damping: float, step: FloatArray) -> None:
     """Writes `J^T (J J^T + damping I)^-1 error` by Cholesky factors of the 6x6 matrix."""
     factor, y = np.zeros((6, 6)), np.zeros(6)
@@ -108,7 +109,7 @@ def damped_step(j: FloatArray, error: FloatArray, damping: float, step: FloatArr
         step[i] = total
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def solve(table: FloatArray, target: FloatArray, starts: FloatArray, settings: FloatArray) -> tuple[Any, int, int]:
     """First start that ends within the tolerances, in order.
 

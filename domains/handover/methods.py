@@ -1,12 +1,13 @@
 """The three methods of the study: a scene in, a configuration of method A, B or ours out.
 
-A: the object 75 cm from the trunk with an arbitrary grasp. B: 50 cm, with the grasp that suits the task. Both on the axis from
-trunk to robot, `CHEST` below the shoulder, whatever the receiver's mobility. Ours: equation 1.
+A: the object 75 cm from the trunk with an arbitrary grasp. B: 50 cm, with the grasp that suits the task. Both on the
+axis from trunk to robot, `CHEST` below the shoulder, whatever the receiver's mobility. Ours: equation 1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from typing import Literal
 
@@ -33,7 +34,8 @@ CHEST = 0.20
 TRIES = 96
 """Pairs of grasp and orientation that A and B try before they give up."""
 
-_Candidate = tuple[int, int, int, FloatArray]
+_Candidate = tuple[int, int, int, Pose]
+"""Rank, grasp, orientation, pose of the object."""
 
 
 def hand_over(scene: Scene, method: str = "ours", options: Options | None = None, *, seed: int = 0) -> Handover:
@@ -65,27 +67,25 @@ def fixed_place(scene: Scene, method: str) -> FloatArray:
 def _fixed_place(scene: Scene, method: str, options: Options, rng: np.random.Generator) -> Handover:
     grasps = sample_grasps(scene.thing, scene.robot.gripper)
     place, calls = fixed_place(scene, method), 0
-    blind = Options(options.orientations, options.distance, options.limits, approaches=options.approaches,
-                    collisions=options.collisions, receiver=False)  # fmt: skip
-    candidates = _arbitrary(grasps, options, rng) if method == "A" else _suited(scene, grasps, place, options)
-    for rank, grasp, k, rotation in islice(candidates, TRIES):
-        pose = Pose(place, rotation)
-        outcome = attempt(scene, grasps, grasp, pose, blind)
+    blind = replace(options, receiver=False)
+    candidates = _arbitrary(grasps, place, options, rng) if method == "A" else _suited(scene, grasps, place, options)
+    for candidate in islice(candidates, TRIES):
+        outcome = attempt(scene, grasps, candidate[1], candidate[3], blind)
         calls += outcome.calls
         if outcome.hold is not None:
-            found = _priced(scene, grasps, (rank, grasp, k, rotation), outcome.hold, options)
-            return Handover("optimal", _as_method(found, method, place), found.reach, calls, 1)
-    advice = Diagnostic("E816", f"method {method}: {scene.robot.name} cannot hold {scene.thing.name} at "
-                        f"{np.round(place, 3).tolist()} m", hint="use method ours, or move the robot's base")  # fmt: skip
+            found = replace(_priced(scene, grasps, candidate, outcome.hold, options), method=method)
+            return Handover("optimal", found, found.reach, calls, 1)
+    message = f"method {method}: {scene.robot.name} cannot hold {scene.thing.name} at {np.round(place, 3).tolist()} m"
+    advice = Diagnostic("E816", message, hint="use method ours, or move the robot's base")
     return Handover("infeasible", None, float("inf"), calls, 1, advice=(advice,))
 
 
-def _arbitrary(grasps: GraspSet, options: Options, rng: np.random.Generator) -> Iterator[_Candidate]:
+def _arbitrary(grasps: GraspSet, place: FloatArray, options: Options, rng: np.random.Generator) -> Iterator[_Candidate]:
     """Any grasp, upright with any heading."""
     n = len(grasps.widths)
     for grasp, turn in zip(rng.permutation(np.repeat(np.arange(n), 4)), rng.permutation(4 * n), strict=True):
         k = int(turn) % options.orientations
-        yield 0, int(grasp), k, rotation_about(UP, 2 * np.pi * k / options.orientations)
+        yield 0, int(grasp), k, Pose(place, rotation_about(UP, 2 * np.pi * k / options.orientations))
 
 
 def _suited(scene: Scene, grasps: GraspSet, place: FloatArray, options: Options) -> Iterator[_Candidate]:
@@ -95,22 +95,16 @@ def _suited(scene: Scene, grasps: GraspSet, place: FloatArray, options: Options)
     ranked, _ = rank_grasps(scene, grasps)
     for rank, grasp in enumerate(ranked):
         for k in range(options.orientations):
-            yield rank, int(grasp), k, rotations[k]
+            yield rank, int(grasp), k, Pose(place, rotations[k])
 
 
 def _priced(scene: Scene, grasps: GraspSet, candidate: _Candidate, held: Hold, options: Options) -> Configuration:
     """A candidate with its costs."""
-    rank, grasp, k, rotation = candidate
-    place = held.tool.position - rotation @ grasps.centres[grasp]
-    parts = distances(cost_points(scene, grasps.centres[grasp]), place[None], rotation[None, None], options.distance)
+    rank, grasp, k, pose = candidate
+    points = cost_points(scene, grasps.centres[grasp])
+    parts = distances(points, pose.position[None], pose.rotation[None, None], options.distance)
     safe = safety(parts.to_hand, parts.to_face, parts.gripper_to_hand, options.limits.safety)
     reach = reachability(parts.to_grasp, options.limits.reach)
-    pose, values = Pose(place, rotation), rank_grasps(scene, grasps)[1]
+    values = rank_grasps(scene, grasps)[1]
     return Configuration("A", pose, human_grasp(scene, pose), grasp, rank, held, -1, k,
                          float(values[grasp]), float(safe[0, 0]), float(reach[0, 0]))  # fmt: skip
-
-
-def _as_method(found: Configuration, method: str, place: FloatArray) -> Configuration:
-    from dataclasses import replace
-
-    return replace(found, method=method, thing=Pose(place, found.thing.rotation))

@@ -24,9 +24,23 @@ SHAPES = ("cube", "cylinder", "sphere", "irregular", "elongated")
 CATEGORIES = ("work_tool", "cleaning_tool", "crockery", "cooking_tool", "electronics")
 MATERIALS = ("plastic", "rubber", "fabric", "glass", "cardboard", "aluminium")
 TEXTURES = ("smooth", "bumpy", "slippery", "grainy", "fluffy")
-AFFORDANCES = tuple(
-    f"to_{verb}" for verb in ["contain", "pour", "clean", "hand_over", "write", "squeeze", "read", "shape", "stack", "shake", "screw", "clip", "cut"]
+_VERBS = (
+    "clean",
+    "clip",
+    "contain",
+    "cut",
+    "hand_over",
+    "pour",
+    "read",
+    "screw",
+    "shake",
+    "shape",
+    "squeeze",
+    "stack",
+    "write",
 )
+AFFORDANCES = tuple(f"to_{verb}" for verb in _VERBS)
+"""The thirteen of the published data."""
 N_POINTS = 600
 
 
@@ -116,11 +130,12 @@ def region_of(thing: HandoverObject, task: str) -> int:
 
 def region_points(thing: HandoverObject, region: int) -> FloatArray:
     """Surface points of a region, shape (m, 3) [m]."""
-    return thing.surface.points[thing.surface.labels == region]
+    points: FloatArray = thing.surface.points[thing.surface.labels == region]
+    return points
 
 
 def region_centre(thing: HandoverObject, region: int) -> FloatArray:
-    """The surface point of a region that is nearest to the mean of its points, shape (3,) [m]: where the receiver grasps."""
+    """The surface point of a region nearest to the mean of its points, shape (3,) [m]: where the receiver grasps."""
     points = region_points(thing, region)
     centre: FloatArray = points[np.linalg.norm(points - points.mean(axis=0), axis=1).argmin()]
     return centre
@@ -139,13 +154,21 @@ def _part_shape(entry: dict[str, Any], where: str) -> _Shape:
     parts = tuple(_part(row, regions, f"{where}: part {i + 1}") for i, row in enumerate(rows))
     if not parts:
         raise MlnError(f"{where}: no parts", hint="give at least one primitive, or mesh = 'file.stl'")
-    middle = trimesh.util.concatenate([part_mesh(part) for part in parts]).bounds.mean(axis=0)
+    middle = _union(parts).bounds.mean(axis=0)
     parts = tuple(_shifted(part, middle) for part in parts)
     surface = sample_parts(parts, N_POINTS, np.random.default_rng(0))
     missing = [name for name, i in regions.items() if not (surface.labels == i).any()]
     if missing:
         raise MlnError(f"{where}: no surface is left for {', '.join(missing)}", hint="its parts are hidden in others")
-    return tuple(regions), parts, surface, trimesh.util.concatenate([part_mesh(part) for part in parts])
+    return tuple(regions), parts, surface, _union(parts)
+
+
+def _union(parts: tuple[Part, ...]) -> trimesh.Trimesh:
+    """All triangles of the parts, those inside as well."""
+    meshes = [part_mesh(part) for part in parts]
+    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [np.asarray(mesh.faces) + n for mesh, n in zip(meshes, offsets[:-1], strict=True)]
+    return trimesh.Trimesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces), process=False)
 
 
 def _part(row: dict[str, Any], regions: dict[str, int], where: str) -> Part:
@@ -183,7 +206,7 @@ def _shifted(part: Part, middle: FloatArray) -> Part:
 
 
 def _mesh_shape(entry: dict[str, Any], where: str, folder: Path) -> _Shape:
-    """A mesh file [m]; its regions are boxes `[[low], [high]]` [m], the first that holds a point wins, the rest is `rest`."""
+    """A mesh file [m]; its regions are boxes `[[low], [high]]` [m], the first that holds a point; others are `rest`."""
     path = folder / take(entry, "mesh", str, where)
     try:
         mesh = trimesh.load_mesh(path)
@@ -214,5 +237,5 @@ def _mesh_shape(entry: dict[str, Any], where: str, folder: Path) -> _Shape:
         )
     labels.setflags(write=False)
     mesh.apply_translation(-middle)
-    mesh.apply_scale(scale)
+    mesh.apply_transform(np.diag([scale, scale, scale, 1.0]))
     return names, (), Surface(locked(scale * (points - middle)), locked(normals), labels), mesh

@@ -4,8 +4,9 @@
     Psi(m) = argmax C_S(Psi, g_r*)  s.t. inverse kinematics    per voxel m, the safest pose
     m* = argmin C_R(Psi(m))                                    the voxel of least reach
 
-Best-first: voxels in order of `min_k C_R(m, k)`, a lower bound of what the solver may leave of them; when the bound of the next
-voxel is above the best found, no other voxel can win. Ties go to higher C_S, then to the lower index of the voxel.
+Best-first: voxels in order of `min_k C_R(m, k)`, a lower bound of what the solver may leave of them; when the bound
+of the next voxel is above the best found, no other voxel can win. Ties go to higher C_S, then to the lower index of
+the voxel.
 """
 
 from __future__ import annotations

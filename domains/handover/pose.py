@@ -1,4 +1,4 @@
-"""Rigid poses: positions and rotations in, `Pose` out. A pose maps points of a body into the frame it is named after."""
+"""Rigid poses: positions and rotations in, `Pose` out. A pose maps points of a body into its frame."""
 
 from __future__ import annotations
 

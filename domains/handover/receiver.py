@@ -1,7 +1,7 @@
 """The receiver: body figures and a mobility level in, an anthropometric trunk and arm on Pinocchio out.
 
-World frame: origin on the floor below the hips, x forward, y left, z up [m]. The arm hangs along -z at zero; joint signs are in
-`data/anthropometry.toml`. Segment masses and inertias: de Leva (1996).
+World frame: origin on the floor below the hips, x forward, y left, z up [m]. The arm hangs along -z at zero; joint
+signs are in `data/anthropometry.toml`. Segment masses and inertias: de Leva (1996).
 """
 
 from __future__ import annotations

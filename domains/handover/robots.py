@@ -1,4 +1,4 @@
-"""Robots: a name or the path of a URDF in, a `Robot` on Pinocchio out. Kinematics and primitive collision bodies only."""
+"""Robots: a name or the path of a URDF in, a `Robot` on Pinocchio out. Kinematics and primitive collision bodies."""
 
 from __future__ import annotations
 

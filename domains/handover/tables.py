@@ -31,7 +31,7 @@ def read_table(path: str | Path | Traversable) -> dict[str, Any]:
         ) from None
 
 
-def take(entry: Mapping[str, Any], key: str, kind: type | tuple[type, ...], where: str) -> Any:
+def take(entry: Mapping[str, Any], key: str, kind: type | tuple[type, ...], where: str) -> Any:  # noqa: ANN401 - what is in a file
     """The value of a key that must be there and of a kind.
 
     Raises:

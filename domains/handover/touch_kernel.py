@@ -10,7 +10,7 @@ from numba import njit
 from mlnlite.domains.handover.pose import FloatArray
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def touches(points: FloatArray, rotation: FloatArray, position: FloatArray, capsules: FloatArray) -> bool:
     """Whether a point of the body lies in a capsule.
 
@@ -38,7 +38,7 @@ def touches(points: FloatArray, rotation: FloatArray, position: FloatArray, caps
     return False
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _squared(capsule: FloatArray, x: float, y: float, z: float) -> float:
     """Squared distance of a point to the axis of a capsule [m^2]."""
     ux, uy, uz = capsule[3] - capsule[0], capsule[4] - capsule[1], capsule[5] - capsule[2]
@@ -46,4 +46,5 @@ def _squared(capsule: FloatArray, x: float, y: float, z: float) -> float:
     along = (px * ux + py * uy + pz * uz) / max(1e-18, ux * ux + uy * uy + uz * uz)
     along = min(1.0, max(0.0, along))
     dx, dy, dz = px - along * ux, py - along * uy, pz - along * uz
-    return dx * dx + dy * dy + dz * dz
+    squared: float = dx * dx + dy * dy + dz * dz
+    return squared

@@ -1,4 +1,4 @@
-"""The workspace around the receiver as voxels: a centre, counts and a step in, voxel centres and object orientations out."""
+"""The workspace around the receiver: a centre, counts and a step in, voxel centres and object orientations out."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def voxel_centres(voxels: VoxelMap) -> FloatArray:
 def presenting_rotations(centres: FloatArray, palm: FloatArray, towards: FloatArray, n: int) -> FloatArray:
     """Orientations of the object that turn a body direction to the palm.
 
-    `R = F(u) Rx(2 pi k / n) B^T`, where F(u) has x along u = (palm - centre) / |palm - centre| and z as upright as possible,
-    and B has x along `towards` and z as near to the body's z as possible. So k = 0 keeps the object upright.
+    `R = F(u) Rx(2 pi k / n) B^T`, where F(u) has x along u = (palm - centre) / |palm - centre| and z as upright as
+    possible, and B has x along `towards` and z as near to the body's z as possible. So k = 0 keeps the object upright.
 
     Args:
         centres: of the voxels, shape (V, 3) [m].
@@ -72,7 +72,7 @@ def presenting_rotations(centres: FloatArray, palm: FloatArray, towards: FloatAr
 
 
 def _upright(x: FloatArray) -> FloatArray:
-    """Right-handed frames, shape (m, 3, 3), with columns x, y, z: z nearest to the vertical, or to the first axis if x is vertical."""
+    """Frames with columns x, y, z, shape (m, 3, 3): z nearest to the vertical, or the first axis if x is vertical."""
     up = np.where(np.abs(x[:, 2:]) < 0.999, UP, np.array([1.0, 0.0, 0.0]))
     z = up - (up * x).sum(axis=1, keepdims=True) * x
     z = z / np.linalg.norm(z, axis=1, keepdims=True)
