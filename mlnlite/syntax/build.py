@@ -66,7 +66,9 @@ def _standard_term(place: Place, span: Span, children: Children) -> tree.Term:
     token, plus = children[-1], len(children) > 1
     if token.type == "STRING" or not is_variable(token):
         if plus:
-            raise SyntaxMistake([mistake("E125", span, "a variable starts with a lower-case letter", name=str(token))])
+            raise SyntaxMistake(
+                [mistake("E125", span, "`+` stands before a variable, which starts in lower case", name=str(token))]
+            )
         return tree.Constant(unquote(token) if token.type == "STRING" else str(token), span)
     if not _VARIABLE.fullmatch(token):
         hint = f'a variable has only letters, digits and _; write "{token}" in quotes if it is a constant'

@@ -74,7 +74,7 @@ def read_directive(text: str, place: Place, pending: Pending) -> Pending:
         case "#group":
             return pending
         case "#fuzzy":
-            hint = "graded truth is not supported: remove the line, and each atom is either true or false"
+            hint = "remove the line: an atom of the predicate is then either true or false"
             raise SyntaxMistake([mistake("E110", mark, hint, construct="`#fuzzy` (a predicate with graded truth)")])
     if text[1:2].isspace() or text == "#":
         raise SyntaxMistake([mistake("E111", mark, "a comment starts with `//`", found=word)])

@@ -11,7 +11,7 @@ from mlnlite.source import Source, Span
 from mlnlite.syntax.build import Fact
 from mlnlite.syntax.grammar import parse_node
 from mlnlite.syntax.includes import ANY_INCLUDE, File, load
-from mlnlite.syntax.lines import split_statements
+from mlnlite.syntax.lines import split_facts
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
 from mlnlite.syntax.tree import Dialect, EvidenceProgram, FactTable, TypeDeclaration
@@ -138,7 +138,7 @@ def _cut(rows: _Rows, constants: dict[str, str]) -> None:
 
 
 def _read_between(file: File, start: int, end: int, dialect: Dialect, reading: _Reading) -> None:
-    for first, last in split_statements(file.code, start, end):
+    for first, last in split_facts(file.code, start, end):
         if len(reading.mistakes) >= MAX_MISTAKES:
             reading.mistakes.append(mistake("E199", Span(file.code.source, first, last), limit=MAX_MISTAKES))
             return

@@ -82,7 +82,7 @@ def explain(failure: Failure) -> Diagnostic:
 
 
 def expectation(failure: Failure) -> str:
-    """What would have fitted, the likeliest first: terms, formulas and connectives by these names, signs as they are."""
+    """What would have fitted, the likeliest first: terms, formulas, connectives by these names, signs as they are."""
     names = failure.expected
     if names >= _FORMULA and failure.language != "evidence":
         names = names & {"RPAR", "COMMA"}
@@ -188,7 +188,7 @@ def _unknown_fact(failure: Failure) -> Diagnostic:
 
 def _chain(failure: Failure) -> Diagnostic | None:
     operator = failure.found_text
-    if operator not in ("=>", "<=>") or not failure.expected & {"$END", "RPAR"}:
+    if operator not in ("=>", "<=>") or not failure.expected & {"$END", "RPAR"} or "COMMA" in failure.expected:
         return None
     hint = f"write `a {operator} (b {operator} c)` or `(a {operator} b) {operator} c`"
     return mistake("E106", failure.found_span, hint, operator=operator)
@@ -197,6 +197,9 @@ def _chain(failure: Failure) -> Diagnostic | None:
 def _closing(failure: Failure) -> Diagnostic | None:
     if failure.found_text in (")", "}") and "$END" in failure.expected:
         return mistake("E104", failure.found_span, "delete it, or open it further left", found=failure.found_text)
+    if failure.text.startswith("*/", failure.at):
+        hint = "a comment goes from `/*` to the first `*/`"
+        return mistake("E104", failure.span(failure.at, failure.at + 2), hint, found="*/")
     return None
 
 
@@ -267,11 +270,11 @@ def _not_a_fact(failure: Failure) -> Diagnostic | None:
 
 
 def _too_early(failure: Failure) -> Diagnostic | None:
-    if failure.found_text:
+    end, opened = len(failure.text[: failure.at].rstrip()), _opened(failure)
+    new_line = opened is not None and "\n" in failure.text[end : failure.at]
+    if failure.found_text and not new_line:
         return None
-    end = len(failure.text.rstrip())
     span, expected = failure.span(end - 1, end), expectation(failure)
-    opened = _opened(failure)
     if opened is not None:
         hint = f"the `{failure.text[opened]}` {_where(failure, opened)} is not closed"
         return mistake("E103", span, hint, opened=failure.text[opened], expected=expected)
@@ -290,7 +293,7 @@ def _unexpected(failure: Failure) -> Diagnostic:
 def _where(failure: Failure, offset: int) -> str:
     """The place of another character of the statement; the line only if it is a different one."""
     span = failure.span(offset, offset + 1)
-    line = "" if span.line == failure.found_span.line else f"line {span.line}, "
+    line = "" if "\n" not in failure.text[offset : failure.at].rstrip() else f"line {span.line}, "
     return f"at {line}column {span.column}"
 
 
@@ -301,9 +304,13 @@ def _hint(failure: Failure) -> str:
         (found == "?" and failure.language == "prac", "write the name of the variable right after its `?`"),
         (found == "*" and failure.rule == "fact", "`*` belongs to the declaration of the predicate in the model"),
         (found in ("=", "!=", "=/="), "`=` compares terms; that two formulas are equivalent is written `<=>`"),
+        (
+            found in ("!", "?") and failure.rule == "declaration",
+            "an argument has one marker: `!` exactly one, `?` at most one",
+        ),
         (found == "," and failure.text.split("=")[0].strip().isidentifier(), "the constants of a type go in braces"),
         (found == "," and "AND" in expected, "conjunction is written `^`"),
-        (found.startswith("#"), "a comment starts with `//`"),
+        (found.startswith(("#", "%")), "a comment starts with `//`"),
         (expected == {"VARIABLE"}, f"variables of the prac dialect start with `?`: `?{found}`"),
         (expected >= {"COMMA", "RPAR"} and found[:1].isalnum(), _SEPARATE),
         (expected >= {"COMMA", "RBRACE"} and found[:1].isalnum(), _SEPARATE),

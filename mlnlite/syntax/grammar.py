@@ -56,7 +56,7 @@ def parse_node(rule: str, text: str, place: Place, language: Language) -> Any:  
 
 def _where(error: UnexpectedInput, end: int) -> tuple[int, set[str]]:
     state: Any = error.interactive_parser
-    accepted = set(state.accepts())
+    accepted = set(state.accepts()) or {"$END"}
     if isinstance(error, UnexpectedToken):
         return (end if error.token.type == "$END" else int(error.token.start_pos or 0)), accepted
     assert isinstance(error, UnexpectedCharacters)

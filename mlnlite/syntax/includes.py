@@ -60,7 +60,7 @@ def _included(path: str, span: Span, chain: tuple[str, ...]) -> tuple[File | Non
     real = _real(str(target))
     if real in chain:
         names = " -> ".join(Path(name).name for name in (*chain[chain.index(real) :], real))
-        return None, [mistake("E138", span, "remove one of these lines", chain=names)]
+        return None, [mistake("E138", span, "one of these files has to do without the other", chain=names)]
     if len(chain) >= MAX_INCLUDES:
         return None, [mistake("E139", span, "put the statements into fewer files", limit=MAX_INCLUDES)]
     if not target.exists():

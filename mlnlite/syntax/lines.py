@@ -13,6 +13,8 @@ from mlnlite.syntax.messages import mistake
 # ruff: noqa: RUF001 (signs that look like ours are the point here)
 # A line that ends like this goes on in the next one.
 _GOES_ON = ("^", "=>", "=", "!", ",", "(", "{", " v", ")v", "->", "&", "|", " and", " or", "∧", "∨", "→", "⇒")
+# A line of evidence, or all lines of a type.
+_FACT_LINE = re.compile(r"[^\W\d][\w'-]*[ \t]*=[ \t]*\{[^{}()=]*\}[^\n]*|\S[^\n]*")
 _EQUALS_V = re.compile(r"=\s*v$")
 _NEW_STATEMENT = re.compile(
     r"#|@|\*\w|---|\w+\s*=\s*\{"  # a directive, a fixed weight, a closed predicate, a separator, a type
@@ -60,14 +62,14 @@ def _goes_on(text: str) -> bool:
     return text.endswith(_GOES_ON) and not _EQUALS_V.search(text)
 
 
-def split_statements(code: Code, first: int = 0, last: int | None = None) -> Iterator[tuple[int, int]]:
-    """Start and end offset of each statement between the offsets `first` and `last`.
+def split_statements(code: Code) -> Iterator[tuple[int, int]]:
+    """Start and end offset of each statement.
 
     A statement ends with its line, unless a parenthesis or brace is open or the line ends in a connective. A blank
     line, or one that is clearly another statement, ends it even then: one mistake shall not swallow the file.
     """
-    start, end, depth, offset = -1, 0, 0, first
-    for line in code.bare[first:last].split("\n"):
+    start, end, depth, offset = -1, 0, 0, 0
+    for line in code.bare.split("\n"):
         text = line.strip()
         if text:
             if start >= 0 and _NEW_STATEMENT.match(text):
@@ -87,3 +89,9 @@ def split_statements(code: Code, first: int = 0, last: int | None = None) -> Ite
         offset += len(line) + 1
     if start >= 0:
         yield start, end
+
+
+def split_facts(code: Code, first: int, last: int) -> Iterator[tuple[int, int]]:
+    """Start and end offset of each line between two offsets that is not blank; a type may take several lines."""
+    for match in _FACT_LINE.finditer(code.bare, first, last):
+        yield match.start(), match.start() + len(match[0].rstrip())

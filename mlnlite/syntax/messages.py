@@ -9,11 +9,11 @@ MESSAGES: dict[str, str] = {
     # any statement
     "E101": "found {found}, expected {expected}",
     "E102": "the statement ends too early: expected {expected}",
-    "E103": "the statement ends while a `{opened}` is open: expected {expected}",
+    "E103": "the line ends while a `{opened}` is open: expected {expected}",
     "E104": "this `{found}` closes nothing",
     "E105": "`{found}` is not an operator here",
     "E106": "a chain of `{operator}` has no agreed reading without parentheses",
-    "E107": "a hard formula (with a final dot) has no weight",
+    "E107": "a formula that ends in a dot is hard and has no weight",
     "E108": "`{number}` is not separated from what follows it",
     "E109": "a second statement on the same line, starting at {found}",
     "E110": "{construct} is not supported",
