@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
-from mlnlite.infer import toulbar2
+from mlnlite.infer import ilp, toulbar2
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.elimination import best_world
 from mlnlite.infer.marginal import CLOSED_FORM, ELIMINATION, MEMORY_LIMIT, WIDTH_LIMIT, limit_reached
 from mlnlite.infer.order import TooWide, Tree, plan
-from mlnlite.infer.parts import SMALL, Batch, Part, batches, divide, parts
+from mlnlite.infer.parts import SMALL, Batch, Part, PartAnswer, batches, divide, parts
 from mlnlite.infer.peel import changed_by, peel, put_back_labels, put_back_values
 from mlnlite.infer.potentials import potentials_of
 from mlnlite.infer.satisfy import feasible_world
 from mlnlite.infer.score import log_weight, truth_of
 
-Method = Literal["auto", "ve", "wcsp"]
-WCSP, SAT = "wcsp", "satisfiability"
+Method = Literal["auto", "ve", "wcsp", "ilp"]
+SAT = "satisfiability"
+_FIRST_TRY = 5.0
 _CHEAP = 1 << 23
 
 
@@ -85,35 +87,35 @@ def map_of(
 
     Args:
         network: what was ground.
-        method: "ve" eliminates, "wcsp" uses toulbar2, "auto" eliminates where that is cheap or toulbar2 is missing.
-        time_limit: [s] for toulbar2.
-        seed: for toulbar2.
+        method: "ve" eliminates, "wcsp" uses toulbar2, "ilp" HiGHS; "auto" eliminates where that is cheap, else gives
+            toulbar2 (where it is installed) a few seconds and HiGHS the rest.
+        time_limit: [s] for the solvers, None for no limit.
+        seed: for the solvers.
         width_limit: largest number of entries of a table in elimination.
 
     Raises:
         Contradiction: no world satisfies the hard formulas.
-        LimitReached: a component is too wide for elimination.
+        LimitReached: a component is too wide for "ve".
         MissingPart: "wcsp" without toulbar2.
         QueryMistake: a weight is not known.
     """
-    potentials = potentials_of(network)
-    core, leaves = (potentials, ()) if method == "wcsp" else peel(potentials, maximise=True)
-    division = divide(core, small=2 if method == "wcsp" else SMALL)
+    potentials, solvers_only = potentials_of(network), method in ("wcsp", "ilp")
+    core, leaves = (potentials, ()) if solvers_only else peel(potentials, maximise=True)
+    division = divide(core, small=2 if solvers_only else SMALL)
     n = division.n_components
     values = np.zeros(len(potentials.cardinality), np.int64)
     search = _Search(values, np.zeros(n), [""] * n, ["optimal"] * n, np.zeros(n))
     everything = np.ones(n, np.bool_)
     for batch in batches(division, everything):
         _list_worlds(batch, search)
-    for_toulbar2 = []
-    for part in parts(division, everything):
-        if method == "wcsp" or not _eliminate(part, method, width_limit, search):
-            for_toulbar2.append(part)
+    large = parts(division, everything)
+    wide = [p for p in large if solvers_only or not _eliminate(p, method, width_limit, search)]
     if np.isneginf(potentials.constant) or np.isneginf(search.best).any():
         raise contradiction(network)
-    if for_toulbar2 and method != "wcsp" and (method == "ve" or not toulbar2.is_available()):
+    if wide and method == "ve":
         raise limit_reached(network, search.wide, width_limit)
-    _ask_toulbar2(network, for_toulbar2, (time_limit, seed), search)
+    for part, answers in zip(wide, _search_wide(wide, method, time_limit, seed), strict=True):
+        _choose(network, part, answers, search)
     put_back_values(leaves, search.values)
     label = put_back_labels(leaves, division.label)
     for component in np.unique(label[changed_by(leaves)]).tolist():
@@ -156,9 +158,11 @@ def _list_worlds(batch: Batch, search: _Search) -> None:
 
 def _eliminate(part: Part, method: Method, width_limit: int, search: _Search) -> bool:
     """Best world of a large component, if its tables are affordable."""
-    use_other = method == "auto" and toulbar2.is_available()
-    tree = plan(part.cardinality, [c.scope for c in part.cells], min(width_limit, _CHEAP) if use_other else width_limit)
-    if isinstance(tree, Tree) and sum(tree.sizes) > (4 * _CHEAP if use_other else max(MEMORY_LIMIT, width_limit)):
+    largest, total = width_limit, max(MEMORY_LIMIT, width_limit)
+    if method == "auto":
+        largest, total = min(width_limit, _CHEAP), 4 * _CHEAP
+    tree = plan(part.cardinality, [c.scope for c in part.cells], largest)
+    if isinstance(tree, Tree) and sum(tree.sizes) > total:
         tree = TooWide(max(map(len, tree.scopes)), float(np.log2(sum(tree.sizes))))
     if isinstance(tree, TooWide):
         search.wide.append((part, tree))
@@ -171,18 +175,35 @@ def _eliminate(part: Part, method: Method, width_limit: int, search: _Search) ->
     return True
 
 
-def _ask_toulbar2(network: Network, wide: list[Part], limits: tuple[float | None, int], search: _Search) -> None:
-    """Best worlds by toulbar2; where it finds none in time, any world that satisfies the hard formulas."""
-    for part, answer in zip(wide, toulbar2.solve_parts(wide, *limits) if wide else [], strict=True):
-        found = feasible_world(part) if answer.world is None else answer.world
-        if found is None:
-            raise contradiction(network)
-        value, highest = _value_and_bound(part, found)
-        search.values[part.variables] = found
-        search.best[part.component] = value
-        search.method[part.component] = SAT if answer.world is None else WCSP
-        search.status[part.component] = "optimal" if answer.optimal else "feasible"
-        search.gap[part.component] = max(0.0, min(answer.bound, highest) - value)
+def _search_wide(wide: list[Part], method: Method, time_limit: float | None, seed: int) -> Iterator[list[PartAnswer]]:
+    """What toulbar2 says of each component, and HiGHS where that is no proof."""
+    end = time.monotonic() + (np.inf if time_limit is None else time_limit)
+    answers: list[list[PartAnswer]] = [[] for _ in wide]
+    if wide and (method == "wcsp" or (method == "auto" and toulbar2.is_available())):
+        few = _FIRST_TRY * len(wide) if time_limit is None else min(_FIRST_TRY * len(wide), time_limit / 3)
+        answers = [[a] for a in toulbar2.solve_parts(wide, time_limit if method == "wcsp" else few, seed)]
+    for i, (part, found) in enumerate(zip(wide, answers, strict=True)):
+        if method != "wcsp" and not any(a.optimal for a in found):
+            left = None if time_limit is None else (end - time.monotonic()) / (len(wide) - i)
+            found.append(ilp.solve_part(part, left, seed))
+        yield found
+
+
+def _choose(network: Network, part: Part, answers: list[PartAnswer], search: _Search) -> None:
+    """Keeps the best of some answers; if none has a world, any world that satisfies the hard formulas."""
+    worlds = [(a.world, a.method) for a in answers]
+    if all(world is None for world, _ in worlds):
+        worlds = [(feasible_world(part), SAT)]
+    scored = [(*_value_and_bound(part, world), world, name) for world, name in worlds if world is not None]
+    if not scored:
+        raise contradiction(network)
+    value, highest, world, name = max(scored, key=lambda s: s[0])
+    proved = any(a.optimal for a in answers)
+    search.values[part.variables] = world
+    search.best[part.component] = value
+    search.method[part.component] = next((a.method for a in answers if a.optimal), name)
+    search.status[part.component] = "optimal" if proved else "feasible"
+    search.gap[part.component] = max(0.0, min(highest, *(a.bound for a in answers)) - value)
 
 
 def _value_and_bound(part: Part, world: Int64) -> tuple[float, float]:

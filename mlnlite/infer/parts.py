@@ -51,6 +51,23 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
+class PartAnswer:
+    """What a solver says of the best world of a component.
+
+    Attributes:
+        world: shape (n,), a value for each variable, None if none was found (there may be none).
+        bound: no world has a larger log-weight than this; infinity if nothing is known.
+        optimal: whether `world` is proved best, up to rounding.
+        method: name of the solver.
+    """
+
+    world: Int64 | None
+    bound: float
+    optimal: bool
+    method: str
+
+
+@dataclass(frozen=True, slots=True)
 class Division:
     """The components of potentials.
 

@@ -12,7 +12,6 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
@@ -22,30 +21,14 @@ from typing import IO
 import numpy as np
 
 from mlnlite.errors import MissingPart
-from mlnlite.ground.network import Float, Int64
+from mlnlite.ground.network import Float
 from mlnlite.infer.conjunctions import Cells
-from mlnlite.infer.parts import Part
+from mlnlite.infer.parts import Part, PartAnswer
 
+WCSP = "wcsp"
 _LARGEST_COST = 2.0**50
 _FINEST = 9
 _GRACE = 10.0
-
-
-@dataclass(frozen=True, slots=True)
-class WcspAnswer:
-    """What toulbar2 says of a component.
-
-    Attributes:
-        world: shape (n,), a value for each variable, None if none was found (there may be none).
-        bound: no world has a larger log-weight than this; infinity if nothing is known.
-        optimal: whether `world` is proved best, up to `rounding`.
-        rounding: largest error of a log-weight through rounding.
-    """
-
-    world: Int64 | None
-    bound: float
-    optimal: bool
-    rounding: float
 
 
 def is_available() -> bool:
@@ -53,7 +36,7 @@ def is_available() -> bool:
     return find_spec("pytoulbar2") is not None
 
 
-def solve_parts(parts: Sequence[Part], time_limit: float | None = None, seed: int = 0) -> list[WcspAnswer]:
+def solve_parts(parts: Sequence[Part], time_limit: float | None = None, seed: int = 0) -> list[PartAnswer]:
     """Solves components one after the other.
 
     Args:
@@ -103,12 +86,12 @@ def _worker(time_limit: float | None) -> Iterator[tuple[IO[str], IO[str]]]:
             process.kill()
 
 
-def _answer(line: str, scale: float, rounding: float) -> WcspAnswer:
+def _answer(line: str, scale: float, rounding: float) -> PartAnswer:
     """The worker's line, scaled back; an empty one if the worker had to be ended."""
     reply = json.loads(line) if line else {"state": None, "bound": None, "optimal": False}
     world = None if reply["state"] is None else np.array(reply["state"], np.int64)
     bound = np.inf if reply["bound"] is None else -reply["bound"] / scale + rounding
-    return WcspAnswer(world, bound, bool(reply["optimal"]), rounding)
+    return PartAnswer(world, bound, bool(reply["optimal"]), WCSP)
 
 
 def _problem(part: Part) -> tuple[dict[str, object], float, float]:

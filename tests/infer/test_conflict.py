@@ -11,7 +11,9 @@ from tests.networks import network
 HARD = np.inf
 
 
-@pytest.mark.parametrize("ask", [marginals_of, map_of, lambda net: map_of(net, method="wcsp")])
+@pytest.mark.parametrize(
+    "ask", [marginals_of, map_of, lambda net: map_of(net, method="wcsp"), lambda net: map_of(net, method="ilp")]
+)
 def test_only_the_formulas_in_conflict_are_named(ask):
     implications = [([-1, 2], 0, 1), ([-2, 3], 1, 1), ([-4, 5], 2, 1), ([4, 5], 2, 1)]
     net = network([("", 1)] * 5, [(implications, False), ([([1], 3, 1), ([-3], 4, 1)], False)], weights=[HARD] * 5)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlnlite.errors import LimitReached
+from mlnlite.errors import LimitReached, MissingPart
 from mlnlite.infer.conjunctions import Cells
 from mlnlite.infer.elimination import best_world, log_sum
 from mlnlite.infer.map import map_of
@@ -101,14 +101,15 @@ def mid_size(seed, n=45):
     return network(blocks, [(r, False) for r in by_length.values()], weights=weights)
 
 
+@pytest.mark.parametrize("method", ["wcsp", "ilp"])
 @pytest.mark.parametrize("seed", range(4))
-def test_toulbar2_finds_worlds_of_the_same_weight(seed):
+def test_solvers_find_worlds_of_the_same_weight(seed, method):
     net = mid_size(seed)
-    by_elimination, by_toulbar2 = map_of(net, method="ve"), map_of(net, method="wcsp")
-    assert by_toulbar2.methods["wcsp"] > 0
-    assert by_toulbar2.log_weight == pytest.approx(by_elimination.log_weight, abs=1e-6)
-    assert by_toulbar2.status == by_elimination.status == "optimal"
-    assert log_weight(net, by_toulbar2.truth) == by_toulbar2.log_weight
+    by_elimination, by_solver = map_of(net, method="ve"), map_of(net, method=method)
+    assert by_solver.methods[method] > 0
+    assert by_solver.log_weight == pytest.approx(by_elimination.log_weight, abs=1e-6)
+    assert by_solver.status == by_elimination.status == "optimal"
+    assert log_weight(net, by_solver.truth) == by_solver.log_weight
 
 
 def test_wide_clauses_become_chains():
@@ -172,10 +173,25 @@ def test_a_sweep_solves_long_grids():
     assert isinstance(plan(np.full(at.size, 2, np.int32), [edges.astype(np.int32)], 1 << 5), TooWide)
 
 
-def test_without_toulbar2_the_error_says_what_would_help(monkeypatch):
+def test_without_toulbar2_there_is_highs(monkeypatch):
     monkeypatch.setattr("mlnlite.infer.toulbar2.is_available", lambda: False)
-    with pytest.raises(LimitReached):
-        map_of(dense())
+    answer = map_of(dense())
+    assert answer.methods["ilp"] == 1
+    assert answer.status == "optimal"
+    assert answer.log_weight == pytest.approx(0.1 * (40 * 39 + 1))
+    with pytest.raises(MissingPart, match="pip install pytoulbar2"):
+        map_of(dense(), method="wcsp")
+
+
+def test_at_most_one_costs_one_count():
+    n = 50
+    pairs = [([-a, -b], 0, 1) for a in range(1, n + 1) for b in range(1, a)]
+    wishes = [([a], 1, a) for a in range(1, n + 1)]
+    net = network([("", 1)] * n, [(pairs, False), (wishes, False)], weights=[10.0, 1.0])
+    answer = map_of(net, method="ilp")
+    best = max(sum(range(n - k + 1, n + 1)) - 10 * k * (k - 1) / 2 for k in range(n))
+    assert answer.log_weight == pytest.approx(best + 10 * len(pairs))
+    assert answer.status == "optimal"
 
 
 def test_time_limits_give_a_world_and_a_bound():
