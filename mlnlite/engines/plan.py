@@ -142,7 +142,7 @@ def columns_of(plan: Plan) -> tuple[str, ...]:
 
 
 Run: TypeAlias = Callable[[Plan], Relation]
-"""Gives all rows of a plan as columns of int64, in rising order of the columns."""
+"""Gives all rows of a plan as columns of int64, in any order."""
 
 
 class Engine(Protocol):

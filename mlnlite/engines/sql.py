@@ -20,19 +20,12 @@ from mlnlite.engines.plan import (
 )
 
 
-def select(plan: Plan) -> str:
-    """The whole query, rows in rising order of the columns.
-
-    >>> select(Scan("friends", ("x", 3)))
-    'SELECT c0 AS "x" FROM "friends" WHERE c1 = 3 ORDER BY "x"'
-    """
-    columns = columns_of(plan)
-    order = f" ORDER BY {', '.join(map(quoted, columns))}" if columns else ""
-    return query(plan) + order
-
-
 def query(plan: Plan) -> str:
-    """A query that gives the rows of a plan; a plan without columns gives one column named `_`."""
+    """A query that gives the rows of a plan; a plan without columns gives one column named `_`.
+
+    >>> query(Scan("friends", ("x", 3)))
+    'SELECT c0 AS "x" FROM "friends" WHERE c1 = 3'
+    """
     match plan:
         case Scan():
             return _scan(plan)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,9 +63,10 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         parts: one for each template.
         query: numbers of further atoms that are to be in the network unless they are known.
     """
-    touched = [p.atoms.ravel() for part in parts for p in part.pieces]
     asked = np.empty(0, np.int64) if query is None else _unknown(np.unique(query), evidence)
-    atoms, block = _with_blocks(np.unique(np.concatenate([asked, *touched])), evidence)
+    touched = distinct([asked, *(p.atoms for part in parts for p in part.pieces)])
+    atoms, block = _with_blocks(touched, evidence)
+    index = index_in(atoms)
     variable, value, cardinality, is_block = _variables(atoms, block, evidence)
     first = np.cumsum([0, *(len(part.decided_true) for part in parts)])
     sizes = np.diff(first)
@@ -76,8 +78,8 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         value=value,
         cardinality=cardinality,
         block=is_block,
-        clauses=_clauses(parts, first, atoms),
-        tables=_tables(parts, first, atoms),
+        clauses=_clauses(parts, first, index),
+        tables=_tables(parts, first, index),
         weights=np.concatenate([np.empty(0), *(t.weights for t in model.templates)]),
         template=np.repeat(np.arange(len(parts), dtype=np.int32), sizes),
         decided_true=np.concatenate([np.empty(0, np.int64), *(part.decided_true for part in parts)]),
@@ -93,6 +95,36 @@ def _lock(network: Network) -> None:
 
 
 # --- atoms and variables
+
+DENSEST = 1 << 28
+"""Atom numbers that a look-up table may span."""
+
+Index: TypeAlias = Callable[[Int64], Int32]
+
+
+def distinct(numbers: Sequence[Int64]) -> Int64:
+    """All numbers of some arrays, each once, rising."""
+    flat = [n.ravel() for n in numbers if n.size]
+    if not flat:
+        return np.empty(0, np.int64)
+    low, high = min(int(n.min()) for n in flat), max(int(n.max()) for n in flat)
+    if high - low >= min(DENSEST, 16 * sum(map(len, flat)) + 4096):
+        return np.unique(np.concatenate(flat))
+    seen = np.zeros(high - low + 1, np.bool_)
+    for n in flat:
+        seen[n - low] = True
+    return np.flatnonzero(seen) + low
+
+
+def index_in(atoms: Int64) -> Index:
+    """The function that gives the place of atoms in the rising array `atoms`."""
+    span = int(atoms[-1] - atoms[0]) + 1 if len(atoms) else 0
+    if not len(atoms) or span > min(DENSEST, 16 * len(atoms) + 4096):
+        return lambda numbers: np.searchsorted(atoms, numbers).astype(np.int32)
+    low = atoms[0]
+    place = np.zeros(span, np.int32)
+    place[atoms - low] = np.arange(len(atoms), dtype=np.int32)
+    return lambda numbers: place[numbers - low]
 
 
 def known_atoms(predicate: Predicate, evidence: Evidence) -> Int64:
@@ -175,15 +207,13 @@ def _may_be_none(first: Int64, is_block: NDArray[np.bool_], evidence: Evidence) 
 # --- factors
 
 
-def _clauses(parts: Sequence[Part], first: Int64, atoms: Int64) -> tuple[Clauses, ...]:
+def _clauses(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Clauses, ...]:
     gathered: dict[tuple[int, bool], list[tuple[Int32, Int32, Int64]]] = {}
     for part, offset in zip(parts, first, strict=False):
         for piece in part.pieces:
             if isinstance(piece.shape, ClauseShape):
-                literals = (np.searchsorted(atoms, piece.atoms) + 1).astype(np.int32)
-                literals *= np.where(piece.shape.signs, 1, -1).astype(np.int32)
-                order = np.argsort(np.abs(literals), axis=1)
-                item = (np.take_along_axis(literals, order, 1), (piece.row + offset).astype(np.int32), piece.count)
+                literals = (index(piece.atoms) + np.int32(1)) * np.where(piece.shape.signs, 1, -1).astype(np.int32)
+                item = (_by_atom(literals), (piece.row + offset).astype(np.int32), piece.count)
                 gathered.setdefault((literals.shape[1], piece.shape.negated), []).append(item)
     blocks = []
     for (_, negated), items in sorted(gathered.items()):
@@ -192,31 +222,60 @@ def _clauses(parts: Sequence[Part], first: Int64, atoms: Int64) -> tuple[Clauses
     return tuple(blocks)
 
 
-def _tables(parts: Sequence[Part], first: Int64, atoms: Int64) -> tuple[Tables, ...]:
+def _tables(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Tables, ...]:
     gathered: dict[tuple[int, bytes], list[tuple[Int32, Int32, Int64]]] = {}
     for part, offset in zip(parts, first, strict=False):
         for piece in part.pieces:
             if isinstance(piece.shape, TableShape):
-                index = np.searchsorted(atoms, piece.atoms).astype(np.int32)
                 key = (piece.shape.truth.ndim, piece.shape.truth.tobytes())
-                gathered.setdefault(key, []).append((index, (piece.row + offset).astype(np.int32), piece.count))
+                gathered.setdefault(key, []).append(
+                    (index(piece.atoms), (piece.row + offset).astype(np.int32), piece.count)
+                )
     blocks = []
     for (n_atoms, truth), items in sorted(gathered.items()):
-        index, weight, count = (np.concatenate(c) for c in zip(*items, strict=True))
-        index, weight, count = _merged(index, weight, count)
-        blocks.append(Tables(index, np.frombuffer(truth, np.bool_).reshape((2,) * n_atoms), weight, count))
+        columns, weight, count = (np.concatenate(c) for c in zip(*items, strict=True))
+        columns, weight, count = _merged(columns, weight, count)
+        blocks.append(Tables(columns, np.frombuffer(truth, np.bool_).reshape((2,) * n_atoms), weight, count))
     return tuple(blocks)
+
+
+def _by_atom(literals: Int32) -> Int32:
+    """The literals of each row in rising order of their atoms."""
+    if literals.shape[1] == 2:
+        swap = np.abs(literals[:, 0]) > np.abs(literals[:, 1])
+        return np.where(swap[:, None], literals[:, ::-1], literals)
+    return np.asarray(np.take_along_axis(literals, np.argsort(np.abs(literals), axis=1), 1))
 
 
 def _merged(columns: Int32, weight: Int32, count: Int64) -> tuple[Int32, Int32, Int64]:
     """Equal rows with equal weights made one, counts added, in rising order."""
-    order = np.lexsort((*reversed(columns.T), weight))
+    key = _packed(columns, weight)
+    order: Int64 = np.lexsort((*reversed(columns.T), weight)) if key is None else np.argsort(key)
     columns, weight, count = columns[order], weight[order], count[order]
-    new = np.ones(len(order), bool)
-    new[1:] = (weight[1:] != weight[:-1]) | (columns[1:] != columns[:-1]).any(axis=1)
-    starts = np.flatnonzero(new)
-    merged = np.add.reduceat(count, starts) if len(starts) else count
-    result = (np.ascontiguousarray(columns[starts]), weight[starts], merged.astype(np.int64))
+    if key is not None:
+        key = key[order]
+        new = np.diff(key, prepend=key[0] - 1 if len(key) else 0) != 0
+    else:
+        new = np.ones(len(order), bool)
+        new[1:] = (weight[1:] != weight[:-1]) | (columns[1:] != columns[:-1]).any(axis=1)
+    if not new.all():
+        starts = np.flatnonzero(new)
+        columns, weight, count = columns[starts], weight[starts], np.add.reduceat(count, starts)
+    result = (np.ascontiguousarray(columns), weight, count.astype(np.int64, copy=False))
     for array in result:
         array.setflags(write=False)
     return result
+
+
+def _packed(columns: Int32, weight: Int32) -> Int64 | None:
+    """One number for each row, in the order of weight and columns; None if that needs more than 63 bits."""
+    if not columns.size:
+        return None
+    low, high = int(columns.min()), int(columns.max())
+    bits = (high - low).bit_length()
+    if bits * columns.shape[1] + int(weight.max()).bit_length() > 62:
+        return None
+    key = weight.astype(np.int64)
+    for column in columns.T:
+        key = (key << bits) | (column.astype(np.int64) - low)
+    return key

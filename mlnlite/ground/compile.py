@@ -244,18 +244,13 @@ def compiled(source: Source, cubes: Sequence[Cube], equalities: Sequence[Equal])
     kept = [*(["row"] if source.tabled else []), *map(atom_column, atoms)]
     kept += [equality_column(i) for i in range(len(open_equalities))]
     seen = set(source.keys).union(*(variables_of(source.formula.atoms[i].arguments) for i in atoms))
-    counted = not kept or not set(free) <= seen or not _always_open(source, atoms)
+    counted = not kept or not set(free) <= seen
     final = Count(plan, tuple(kept)) if counted else Project(plan, tuple(kept))
     return Compiled(final, atoms, known, open_equalities, counted)
 
 
 def _decided(source: Source, atom: AtomRef) -> bool:
     return source.is_closed(source.formula.atoms[atom.index])
-
-
-def _always_open(source: Source, atoms: Sequence[int]) -> bool:
-    predicates = {source.formula.atoms[i].predicate for i in atoms}
-    return not any(len(source.evidence.facts[p].truth) or source.evidence.predicates[p].closed for p in predicates)
 
 
 def strides(evidence: Evidence, predicate: str) -> list[int]:
