@@ -408,8 +408,9 @@ def test_a_failed_write_leaves_the_old_file(folder, monkeypatch):
 
 
 def test_interruption_is_one_line(folder):
-    slow = "import time, mlnlite.cli, mlnlite.cli.check as c; c._summary = lambda *a: time.sleep(60); mlnlite.cli.main()"
-    command = [sys.executable, "-c", slow, "check", str(folder / "m.mln")]
+    slow = "import time, mlnlite.cli.check as c; c._summary = lambda *a: time.sleep(60)"
+    run_it = "import mlnlite.cli; mlnlite.cli.main()"
+    command = [sys.executable, "-c", f"{slow}\n{run_it}", "check", str(folder / "m.mln")]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     time.sleep(2)
     process.send_signal(signal.SIGINT)

@@ -5,6 +5,7 @@ import doctest
 import re
 import shlex
 import shutil
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from mlnlite.cli import mlnlite as command
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "docs" / "examples"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-BLOCK = re.compile(r"^```(python|console)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^( *)```(python|console)\n(.*?)^\1```", re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -25,11 +26,11 @@ def test_examples_run(page, tmp_path, monkeypatch):
     shutil.copytree(EXAMPLES, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     names = {"__name__": page.stem}
-    for kind, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+    for _, kind, text in BLOCK.findall(page.read_text(encoding="utf-8")):
         if kind == "python":
-            run_python(text, names)
+            run_python(textwrap.dedent(text), names)
         else:
-            run_console(text)
+            run_console(textwrap.dedent(text))
 
 
 def run_python(text, names):
@@ -59,8 +60,6 @@ def run_console(text):
 
 
 def expected_code(expected):
-    if expected.startswith("Usage") and "Error:" in expected:
-        return 2
     return 2 if re.search(r"^(\S+: )?error ", expected, re.MULTILINE) else 0
 
 

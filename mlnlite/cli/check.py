@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
-from mlnlite.cli.options import FILE, dialect_option, evidence_option, format_option
+from mlnlite.cli.options import APART, FILE, dialect_option, evidence_option, format_option
 from mlnlite.cli.terminal import shortened, table, working
 from mlnlite.errors import Diagnostic
 
@@ -32,15 +32,14 @@ class _Options(TypedDict):
 
 @click.command()
 @click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...")
-@evidence_option
+@evidence_option(APART)
 @dialect_option
 @format_option("text", "json")
 @click.option("-v", "--verbose", is_flag=True, help="Show all constants and all templates.")
 def check(**options: Unpack[_Options]) -> None:
     """Say what a model and its evidence are, and what is wrong with them.
 
-    MODEL is one file, or several that continue each other. Evidence may have many databases, in files or between
-    `---`; each is a world of its own here, as in learning.
+    MODEL is one file, or several that continue each other.
     """
     with working("reading"):
         summary = _summary(options["models"], options["evidence"], options["dialect"])

@@ -10,6 +10,7 @@ import click
 from mlnlite.cli.files import emit
 from mlnlite.cli.options import (
     FILE,
+    TOGETHER,
     closed_world_option,
     dialect_option,
     evidence_option,
@@ -38,7 +39,7 @@ class _Options(TypedDict):
 
 @click.command()
 @click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...")
-@evidence_option
+@evidence_option(TOGETHER)
 @click.option(
     "-q", "--query", multiple=True, required=True, metavar="NAMES", help="Predicates whose facts are the labels."
 )

@@ -65,7 +65,7 @@ class _Inputs:
     metavar="NAMES",
     help="Predicates to predict from the others (conditional pseudo-likelihood). By default all.",
 )
-@time_limit_option
+@time_limit_option("Stop after this long, with the best weights so far.")
 @dialect_option
 @format_option("text", "json")
 def learn(**options: Unpack[_Options]) -> None:

@@ -52,17 +52,21 @@ output_option = click.option(
     callback=_writable,
     help="File to write; it appears when it is complete. By default standard output.",
 )
-time_limit_option = click.option(
-    "--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Stop after this long."
-)
-evidence_option = click.option(
-    "-e",
-    "--evidence",
-    type=FILE,
-    multiple=True,
-    metavar="FILE",
-    help="Facts that are known. Several files describe one world together.",
-)
+TOGETHER = "Facts that are known. Several files describe one world together."
+APART = "Facts that are known. Each database, in files or between `---`, is a world of its own."
+
+
+def evidence_option(text: str) -> Callable[[Command], Command]:
+    """`-e`, with what several files mean."""
+    return click.option("-e", "--evidence", type=FILE, multiple=True, metavar="FILE", help=text)
+
+
+def time_limit_option(text: str) -> Callable[[Command], Command]:
+    """`--time-limit`, with what happens after it."""
+    limit = click.FloatRange(min=0, min_open=True)
+    return click.option("--time-limit", type=limit, metavar="SECONDS", help=text)
+
+
 database_option = click.option(
     "--database", type=click.IntRange(min=1), metavar="N", help="Which of the databases of the file, the first being 1."
 )

@@ -12,6 +12,7 @@ import click
 from mlnlite.cli.files import emit
 from mlnlite.cli.options import (
     FILE,
+    TOGETHER,
     closed_world_option,
     database_option,
     dialect_option,
@@ -52,7 +53,7 @@ class _Options(TypedDict):
 
 @click.command()
 @click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...")
-@evidence_option
+@evidence_option(TOGETHER)
 @click.option(
     "-q",
     "--query",
@@ -74,13 +75,13 @@ class _Options(TypedDict):
 )
 @database_option
 @output_option
-@time_limit_option
+@time_limit_option("Stop the search for the most probable world after this long, with the best so far.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Where chance starts.")
 @click.option(
     "--width-limit",
     type=click.IntRange(min=2),
     metavar="ENTRIES",
-    help="Largest number of entries of a table in exact inference.",
+    help="Largest number of entries of a table in exact marginals, 2^25 by default, 8 bytes each.",
 )
 @dialect_option
 @format_option("text", "json", "csv")
