@@ -88,18 +88,21 @@ def read_object(name: str, *, catalogue: str | Path | None = None) -> HandoverOb
     Raises:
         MlnError: unknown object, or a mistake in its entry, with file and key.
     """
-    return _read_object(name, None if catalogue is None else str(catalogue))
+    return _known_object(name) if catalogue is None else _read_entry(name, Path(catalogue))
 
 
-@lru_cache(maxsize=128)
-def _read_object(name: str, catalogue: str | None) -> HandoverObject:
-    source: Path | Traversable = DATA / "objects.toml" if catalogue is None else Path(catalogue)
+@lru_cache(maxsize=64)
+def _known_object(name: str) -> HandoverObject:
+    return _read_entry(name, DATA / "objects.toml")
+
+
+def _read_entry(name: str, source: Path | Traversable) -> HandoverObject:
     table = read_table(source)
     entry = table[choose(name, table, "object")]
-    where = f"{source.name if catalogue is None else catalogue}: [{name}]"
+    where = f"{source if isinstance(source, Path) else source.name}: [{name}]"
     if not isinstance(entry, dict):
         raise MlnError(f"{where}: expected a table of attributes", hint=f"write [{name}] and its keys below")
-    return _object(name, entry, where, Path(catalogue).parent if catalogue else Path())
+    return _object(name, entry, where, source.parent if isinstance(source, Path) else Path())
 
 
 def _object(name: str, entry: dict[str, Any], where: str, folder: Path) -> HandoverObject:

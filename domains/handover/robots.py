@@ -69,11 +69,11 @@ def robot_names() -> tuple[str, ...]:
     return tuple(_known())
 
 
+@lru_cache(maxsize=1)
 def _known() -> dict[str, Any]:
     return tomllib.loads((DATA / "robots.toml").read_text())
 
 
-@lru_cache(maxsize=8)
 def read_robot(
     name: str, *, tool: str = "", base: Pose | None = None, gripper: Gripper | None = None, meshes: str = ""
 ) -> Robot:
@@ -91,27 +91,29 @@ def read_robot(
     """
     known = _known()
     if name in known:
-        return _known_robot(name, known[name], gripper)
+        return _known_robot(name, gripper)
     path = Path(name)
     if path.suffix.lower() != ".urdf":
-        raise MlnError(
-            f"unknown robot {name!r}; known: {', '.join(known)}, or the path of a .urdf file",
-            hint=did_you_mean(name, list(known)),
-        )
+        hint = did_you_mean(name, list(known)) or "give a known name or the path of a URDF"
+        raise MlnError(f"unknown robot {name!r}; known: {', '.join(known)}, or the path of a .urdf file", hint=hint)
     try:
         text = path.read_text()
     except (OSError, UnicodeDecodeError) as reason:
-        raise MlnError(
-            f"cannot read the robot file {name}: {reason}", hint="give the path of a URDF text file"
-        ) from None
-    pose = base or pose_at(1.1, -0.15, 0.0, np.pi)
-    both = (("standing", pose), ("seated", pose))
-    model, geometry = _build(path.name, text, meshes)
-    tool = tool or model.frames[model.nframes - 1].name
-    return _robot(path.stem, (model, geometry), tool, gripper or Gripper(), both)
+        raise MlnError(f"cannot read the robot file {name}: {reason}", hint="give the path of a URDF file") from None
+    return _own_robot((path.name, text, meshes), tool, gripper or Gripper(), base)
 
 
-def _known_robot(name: str, entry: dict[str, Any], gripper: Gripper | None) -> Robot:
+@lru_cache(maxsize=8)
+def _own_robot(source: tuple[str, str, str], tool: str, gripper: Gripper, base: Pose | None) -> Robot:
+    """Remembered by the text of the file, so that solvers are built once."""
+    built, base = _build(*source), base or pose_at(1.1, -0.15, 0.0, np.pi)
+    tool = tool or built[0].frames[built[0].nframes - 1].name
+    return _robot(Path(source[0]).stem, built, tool, gripper, (("standing", base), ("seated", base)))
+
+
+@lru_cache(maxsize=8)
+def _known_robot(name: str, gripper: Gripper | None) -> Robot:
+    entry = _known()[name]
     bases = tuple((posture, pose_at(*numbers)) for posture, numbers in entry["base"].items())
     built = _build(entry["urdf"], (DATA / entry["urdf"]).read_text(), "")
     robot = _robot(name, built, entry["tool"], gripper or Gripper(**entry["gripper"]), bases)

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip("pinocchio")
+
+from click.testing import CliRunner
+
+from mlnlite import MissingPart, Plugin
+from mlnlite.domains import handover as package
+from mlnlite.domains.handover.cli import handover
+
+
+def _run(*words):
+    return CliRunner().invoke(handover, list(words))
+
+
+def test_optimise_answers_in_words_and_in_json():
+    words = ("optimise", "--object", "mug", "--task", "to_pour", "--level", "L")
+    text, data = _run(*words), _run(*words, "--format", "json")
+    assert text.exit_code == 0, text.output
+    assert "method ours: optimal" in text.output
+    assert text.output.count("pass ") == 5
+    answer = json.loads(data.output)
+    assert answer["status"] == "optimal"
+    assert answer["region"] == "handle"
+    assert len(answer["joints_rad"]) == 7
+    assert all(check["passed"] for check in answer["checks"].values())
+
+
+@pytest.mark.parametrize("method", ["A", "B"])
+def test_other_methods_and_robots(method):
+    found = _run("optimise", "--object", "book", "--method", method, "--robot", "panda", "--posture", "seated")
+    assert found.exit_code == 0, found.output
+    assert f"method {method}" in found.output
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--object", "mugg"), "did you mean mug"),
+        (("--task", "to_cut"), "unknown task"),
+        (("--level", "X"), "unknown mobility level"),
+        (("--method", "D"), "unknown method"),
+        (("--catalogue", "absent.toml"), "cannot read"),
+        (("--hand", "3", "0", "1"), "cannot be at"),
+        (("--voxels", "3", "--step", "0.001"), "safety"),
+    ],
+)
+def test_mistakes_are_told_and_end_with_one(words, said):
+    found = _run("optimise", *words)
+    assert found.exit_code == 1
+    assert said in found.output
+    assert "hint" in found.output
+
+
+def test_effort_and_compare_write_their_pages(tmp_path):
+    effort = _run("effort", "--objects", "mug,book", "--out", str(tmp_path))
+    assert effort.exit_code == 0, effort.output
+    page = (tmp_path / "effort.md").read_text()
+    assert page.count("\n| ") == 13
+    assert (tmp_path / "effort.png").stat().st_size > 5000
+    compare = _run("compare", "--objects", "marker", "--robot", "pr2", "--out", str(tmp_path))
+    assert compare.exit_code == 0, compare.output
+    assert "1 of 1" in (tmp_path / "compare.md").read_text()
+
+
+def test_a_figure_is_written(tmp_path):
+    found = _run("optimise", "--object", "shoe", "--figure", str(tmp_path / "shoe.png"))
+    assert found.exit_code == 0, found.output
+    assert (tmp_path / "shoe.png").stat().st_size > 10_000
+
+
+def test_the_package_is_light_and_names_what_it_offers():
+    script = "import sys, mlnlite.domains.handover as h; h.plugin.commands(); print('pinocchio' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+    assert isinstance(package.plugin, Plugin)
+    for name in dir(package):
+        assert getattr(package, name) is not None
+    with pytest.raises(AttributeError):
+        package.nothing  # noqa: B018
+
+
+def test_a_missing_package_says_what_to_install(monkeypatch):
+    def absent(name):
+        raise ModuleNotFoundError(name="pinocchio")
+
+    monkeypatch.setattr(package, "import_module", absent)
+    with pytest.raises(MissingPart, match="pip install"):
+        package.load("robots")
