@@ -15,7 +15,7 @@ from mlnlite.infer import ilp, toulbar2
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.elimination import best_world
 from mlnlite.infer.marginal import CLOSED_FORM, ELIMINATION, MEMORY_LIMIT, WIDTH_LIMIT, limit_reached
-from mlnlite.infer.order import TooWide, Tree, plan
+from mlnlite.infer.order import TooWide, plan
 from mlnlite.infer.parts import SMALL, Batch, Part, PartAnswer, batches, divide, parts
 from mlnlite.infer.peel import changed_by, peel, put_back_labels, put_back_values
 from mlnlite.infer.potentials import potentials_of
@@ -25,7 +25,8 @@ from mlnlite.infer.score import log_weight, truth_of
 Method = Literal["auto", "ve", "wcsp", "ilp"]
 SAT = "satisfiability"
 _FIRST_TRY = 5.0
-_CHEAP = 1 << 23
+_CHEAP = 1 << 21
+_CHEAP_IN_ALL = 1 << 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,10 +161,8 @@ def _eliminate(part: Part, method: Method, width_limit: int, search: _Search) ->
     """Best world of a large component, if its tables are affordable."""
     largest, total = width_limit, max(MEMORY_LIMIT, width_limit)
     if method == "auto":
-        largest, total = min(width_limit, _CHEAP), 4 * _CHEAP
-    tree = plan(part.cardinality, [c.scope for c in part.cells], largest)
-    if isinstance(tree, Tree) and sum(tree.sizes) > total:
-        tree = TooWide(max(map(len, tree.scopes)), float(np.log2(sum(tree.sizes))))
+        largest, total = min(width_limit, _CHEAP), _CHEAP_IN_ALL
+    tree = plan(part.cardinality, [c.scope for c in part.cells], largest, total)
     if isinstance(tree, TooWide):
         search.wide.append((part, tree))
         return False

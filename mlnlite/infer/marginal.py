@@ -11,7 +11,7 @@ from mlnlite.errors import LimitReached
 from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.elimination import log_sum
-from mlnlite.infer.order import TooWide, Tree, plan
+from mlnlite.infer.order import TooWide, plan
 from mlnlite.infer.parts import Batch, Division, Part, batches, divide, parts
 from mlnlite.infer.peel import (
     Leaves,
@@ -173,9 +173,8 @@ def _list_worlds(batch: Batch, found: Distributions) -> None:
 
 def _eliminate(part: Part, wanted: Bool, width_limit: int, found: Distributions) -> None:
     """Sums over all worlds of a large component."""
-    tree = plan(part.cardinality, [c.scope for c in part.cells], width_limit)
-    if isinstance(tree, Tree) and sum(tree.sizes) > max(MEMORY_LIMIT, width_limit):
-        tree = TooWide(max(map(len, tree.scopes)), float(np.log2(sum(tree.sizes))))
+    scopes = [c.scope for c in part.cells]
+    tree = plan(part.cardinality, scopes, width_limit, max(MEMORY_LIMIT, width_limit))
     if isinstance(tree, TooWide):
         found.wide.append((part, tree))
         return
@@ -193,9 +192,15 @@ def limit_reached(network: Network, wide: list[tuple[Part, TooWide]], width_limi
     part, needs = max(wide, key=lambda w: w[1].log2_size)
     n_atoms = int(np.isin(network.variable, part.variables).sum())
     example = _example(network, part)
+    if needs.in_all:
+        limit = max(MEMORY_LIMIT, width_limit)
+        takes = f"tables over up to {needs.variables} variables (2^{needs.log2_size:.1f} entries in all"
+    else:
+        limit = width_limit
+        takes = f"a table over {needs.variables} variables (2^{needs.log2_size:.1f} entries"
     return LimitReached(
-        f"{n_atoms} unknown atoms{example} hang together so closely that an exact answer needs a table over "
-        f"{needs.variables} variables (2^{needs.log2_size:.1f} entries; the limit is 2^{np.log2(width_limit):.0f})",
+        f"{n_atoms} unknown atoms{example} hang together so closely that an exact answer needs {takes}; "
+        f"the limit is 2^{np.log2(limit):.0f})",
         hint="give more evidence, declare predicates closed world, mark a functional argument with `!` or `?`, "
         "ask for fewer atoms, or raise the width limit",
     )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from itertools import combinations
-from math import prod
+from math import log2, prod
 from typing import Literal
 
 import numpy as np
@@ -43,12 +43,15 @@ class TooWide:
     """No order was found within the limit.
 
     Attributes:
-        variables: number of variables of the smallest table that would go past it.
-        log2_size: its log2 number of entries.
+        variables: number of variables of the smallest table that would go past it, or of the largest table if only all
+            of them together are too much.
+        log2_size: log2 number of entries of that table, or of all.
+        in_all: whether it is all tables together.
     """
 
     variables: int
     log2_size: float
+    in_all: bool = False
 
 
 def _edges(n: int, scopes: Sequence[Int32]) -> tuple[Int64, Int64]:
@@ -77,7 +80,7 @@ def _sweep(n: int, edges: tuple[Int64, Int64]) -> list[int]:
     return place.tolist()
 
 
-def plan(cardinality: Int32, scopes: Sequence[Int32], limit: int) -> Tree | TooWide:
+def plan(cardinality: Int32, scopes: Sequence[Int32], limit: int, total: int | None = None) -> Tree | TooWide:
     """A clique tree by greedy elimination: fewest fill edges first.
 
     Where that is expensive, the cheapest of it, a sweep from one end of the graph to the other (which is best for
@@ -87,6 +90,7 @@ def plan(cardinality: Int32, scopes: Sequence[Int32], limit: int) -> Tree | TooW
         cardinality: shape (n,).
         scopes: arrays of shape (m, k), variables of the cells.
         limit: largest number of entries of a table.
+        total: largest number of entries of all tables together.
     """
     bits = np.log2(np.maximum(cardinality, 2)).tolist()
     n, edges = len(cardinality), _edges(len(cardinality), scopes)
@@ -94,14 +98,19 @@ def plan(cardinality: Int32, scopes: Sequence[Int32], limit: int) -> Tree | TooW
     trees, failed = [], []
     for rule in rules:
         place = _sweep(n, edges) if rule == "sweep" else []
-        order = _greedy(_Graph(_neighbours(n, edges), bits, float(np.log2(limit)) + 1e-9, rule, place, {}))
+        order = _greedy(_graph(_neighbours(n, edges), bits, log2(limit) + 1e-9, rule, place))
         if isinstance(order, TooWide):
             failed.append(order)
         else:
             trees.append(_tree(order, cardinality))
         if trees and sum(trees[-1].sizes) <= _EXPENSIVE:
             break
-    return min(trees, key=lambda t: sum(t.sizes)) if trees else min(failed, key=lambda f: f.log2_size)
+    if not trees:
+        return min(failed, key=lambda f: f.log2_size)
+    best = min(trees, key=lambda t: sum(t.sizes))
+    if total is not None and sum(best.sizes) > total:
+        return TooWide(max(map(len, best.scopes)), log2(sum(best.sizes)), in_all=True)
+    return best
 
 
 @dataclass(slots=True)
@@ -111,10 +120,11 @@ class _Graph:
     Attributes:
         adjacent: the neighbours of each variable.
         bits: log2 cardinality of each variable.
-        limit: log2 size of the largest table that may be made.
+        limit: log2 size of the largest table that may be made; variables whose table would pass it wait.
         rule: what the choice goes by.
         place: of each variable in the sweep.
-        missing: for each variable whose table is within the limit, the edges missing between its neighbours.
+        weight: for each variable the log2 size of the table that eliminating it makes.
+        missing: for each variable how many edges its neighbours miss (followed for "fill" only).
     """
 
     adjacent: list[set[int]]
@@ -122,75 +132,77 @@ class _Graph:
     limit: float
     rule: Rule
     place: list[int]
-    missing: dict[int, int]
+    weight: list[float]
+    missing: list[int]
 
 
-def _weight(graph: _Graph, v: int) -> float:
-    """Log2 size of the table that eliminating `v` makes."""
-    return graph.bits[v] + sum(graph.bits[u] for u in graph.adjacent[v])
-
-
-def _measure(graph: _Graph, v: int) -> None:
-    """Counts the missing edges between neighbours of `v`, if it may be eliminated at all."""
-    graph.missing.pop(v, None)
-    if _weight(graph, v) <= graph.limit:
-        near = graph.adjacent[v]
-        present = sum(len(near & graph.adjacent[u]) for u in near) if graph.rule == "fill" else 0
-        graph.missing[v] = (len(near) * (len(near) - 1) - present) // 2
+def _graph(adjacent: list[set[int]], bits: list[float], limit: float, rule: Rule, place: list[int]) -> _Graph:
+    """The graph before anything is eliminated."""
+    weight = [bits[v] + sum(bits[u] for u in near) for v, near in enumerate(adjacent)]
+    missing = [len(near) * (len(near) - 1) // 2 for near in adjacent]
+    if rule == "fill":
+        for v, near in enumerate(adjacent):
+            missing[v] -= sum(len(near & adjacent[u]) for u in near) // 2
+    return _Graph(adjacent, bits, limit, rule, place, weight, missing)
 
 
 def _key(graph: _Graph, v: int) -> tuple[float, float, int]:
     """What decides: fewest missing edges, then smallest table; or the place in the sweep; or the table alone."""
-    weight = _weight(graph, v)
     if graph.rule == "sweep":
         return graph.place[v], 0.0, v
-    return (graph.missing[v], weight, v) if graph.rule == "fill" else (weight, 0.0, v)
+    return (graph.missing[v], graph.weight[v], v) if graph.rule == "fill" else (graph.weight[v], 0.0, v)
 
 
 def _greedy(graph: _Graph) -> list[tuple[int, set[int]]] | TooWide:
     """Variables in order of elimination, each with its neighbours at that time."""
-    for v in range(len(graph.adjacent)):
-        _measure(graph, v)
-    heap = [_key(graph, v) for v in graph.missing]
+    left = set(range(len(graph.adjacent)))
+    heap = [_key(graph, v) for v in left if graph.weight[v] <= graph.limit]
     heapify(heap)
     order: list[tuple[int, set[int]]] = []
     while heap:
         entry = heappop(heap)
         v = entry[2]
-        if v in graph.missing and _key(graph, v) == entry:
+        if v in left and graph.weight[v] <= graph.limit and _key(graph, v) == entry:
+            left.remove(v)
             order.append((v, graph.adjacent[v]))
             for u in _eliminate(graph, v):
-                heappush(heap, _key(graph, u))
-    left = set(range(len(graph.adjacent))).difference(v for v, _ in order)
+                if graph.weight[u] <= graph.limit:
+                    heappush(heap, _key(graph, u))
     if not left:
         return order
-    size, smallest = min((_weight(graph, v), v) for v in left)
+    size, smallest = min((graph.weight[v], v) for v in left)
     return TooWide(len(graph.adjacent[smallest]) + 1, size)
 
 
 def _eliminate(graph: _Graph, v: int) -> set[int]:
-    """Joins the neighbours of `v` and takes it out; returns the candidates whose key this may have changed."""
+    """Joins the neighbours of `v` and takes it out; returns the variables whose key this may have changed."""
     near = graph.adjacent[v]
     changed = set(near)
-    if graph.missing.pop(v) and graph.rule == "fill":
-        for a, b in combinations(sorted(near), 2):
-            if b not in graph.adjacent[a]:
+    for u in near:
+        own = graph.adjacent[u]
+        own.remove(v)
+        graph.weight[u] -= graph.bits[v]
+        if graph.rule == "fill":
+            graph.missing[u] -= len(own) - len(own & near)
+    for a in sorted(near):
+        for b in sorted(near - graph.adjacent[a]):
+            if b != a:
                 changed |= _link(graph, a, b)
-    for u in near:
-        graph.adjacent[u] |= near
-        graph.adjacent[u] -= {u, v}
-    for u in near:
-        _measure(graph, u)
-    return changed & graph.missing.keys()
+    return changed
 
 
 def _link(graph: _Graph, a: int, b: int) -> set[int]:
-    """Adds an edge; returns the candidates that now miss one edge less."""
-    common = graph.adjacent[a] & graph.adjacent[b] & graph.missing.keys()
-    graph.adjacent[a].add(b)
-    graph.adjacent[b].add(a)
+    """Adds an edge; returns the variables that now miss one edge less."""
+    ours, theirs = graph.adjacent[a], graph.adjacent[b]
+    common = ours & theirs if graph.rule == "fill" else set()
+    graph.missing[a] += len(ours) - len(common)
+    graph.missing[b] += len(theirs) - len(common)
     for c in common:
         graph.missing[c] -= 1
+    graph.weight[a] += graph.bits[b]
+    graph.weight[b] += graph.bits[a]
+    ours.add(b)
+    theirs.add(a)
     return common
 
 

@@ -204,3 +204,23 @@ def test_time_limits_give_a_world_and_a_bound():
     assert answer.status == "feasible"
     assert 0 < answer.gap < 400
     assert answer.log_weight == log_weight(net, answer.truth)
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), limit=st.sampled_from([1 << 6, 1 << 20]))
+def test_plans_are_clique_trees(seed, limit):
+    rng = np.random.default_rng(seed)
+    cardinality = rng.integers(2, 4, 25).astype(np.int32)
+    cells = random_cells(rng, cardinality, 60)
+    tree = plan(cardinality, [c.scope for c in cells], limit)
+    if isinstance(tree, TooWide):
+        return
+    for scope in (row for c in cells for row in c.scope.tolist()):
+        assert any(set(scope) <= set(clique) for clique in tree.scopes)
+    eliminated = [v for scope, k in zip(tree.scopes, tree.n_eliminated, strict=True) for v in scope[:k]]
+    assert sorted(eliminated) == list(range(25))
+    for k, (scope, count, parent) in enumerate(zip(tree.scopes, tree.n_eliminated, tree.parents, strict=True)):
+        assert list(scope) == sorted(scope, key=lambda v: tree.position[v])
+        assert parent > k or (parent == -1 and count == len(scope))
+        assert set(scope[count:]) <= set(tree.scopes[parent]) or parent == -1
+        assert tree.sizes[k] == np.prod(cardinality[list(scope)]) <= limit
