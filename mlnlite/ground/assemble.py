@@ -218,7 +218,7 @@ def _clauses(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Clauses
     blocks = []
     for (_, negated), items in sorted(gathered.items()):
         literals, weight, count = (np.concatenate(c) for c in zip(*items, strict=True))
-        blocks.append(Clauses(*_merged(literals, weight, count), negated))
+        blocks.append(Clauses(*merged_rows(literals, weight, count), negated))
     return tuple(blocks)
 
 
@@ -234,7 +234,7 @@ def _tables(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Tables, 
     blocks = []
     for (n_atoms, truth), items in sorted(gathered.items()):
         columns, weight, count = (np.concatenate(c) for c in zip(*items, strict=True))
-        columns, weight, count = _merged(columns, weight, count)
+        columns, weight, count = merged_rows(columns, weight, count)
         blocks.append(Tables(columns, np.frombuffer(truth, np.bool_).reshape((2,) * n_atoms), weight, count))
     return tuple(blocks)
 
@@ -247,7 +247,7 @@ def _by_atom(literals: Int32) -> Int32:
     return np.asarray(np.take_along_axis(literals, np.argsort(np.abs(literals), axis=1), 1))
 
 
-def _merged(columns: Int32, weight: Int32, count: Int64) -> tuple[Int32, Int32, Int64]:
+def merged_rows(columns: Int32, weight: Int32, count: Int64) -> tuple[Int32, Int32, Int64]:
     """Equal rows with equal weights made one, counts added, in rising order."""
     key = _packed(columns, weight)
     order: Int64 = np.lexsort((*reversed(columns.T), weight)) if key is None else np.argsort(key)

@@ -61,7 +61,7 @@ def shape_of(expression: Expression) -> Shape:
             f"at most {WIDEST_TABLE} are possible",
             hint="give evidence, declare predicates of the quantified part closed, or split the formula into clauses",
         )
-    return _table_shape(atoms, truth_table(expression, atoms))
+    return table_shape(atoms, truth_table(expression, atoms))
 
 
 def _flat(expression: Expression) -> ClauseShape | None:
@@ -127,7 +127,7 @@ def _values(expression: Expression, axes: dict[int, NDArray[np.bool_]]) -> NDArr
             assert_never(expression)
 
 
-def _table_shape(atoms: tuple[int, ...], truth: NDArray[np.bool_]) -> Shape:
+def table_shape(atoms: tuple[int, ...], truth: NDArray[np.bool_]) -> Shape:
     """The simplest shape of a truth table: atoms that do not matter are dropped."""
     axis = 0
     kept = list(atoms)

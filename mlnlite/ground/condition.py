@@ -1,0 +1,200 @@
+"""New evidence on the open atoms of a network, without grounding again. Network and truth values in, network out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.errors import Contradiction, Diagnostic
+from mlnlite.ground.assemble import merged_rows
+from mlnlite.ground.network import Clauses, Network, Tables
+from mlnlite.ground.residual import ClauseShape, Decided, table_shape
+from mlnlite.model.evidence import Evidence, Facts
+
+Int8 = NDArray[np.int8]
+Int32 = NDArray[np.int32]
+Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+UNKNOWN = -1
+
+
+def condition(network: Network, known: Int8) -> Network:
+    """The network with some of its atoms known.
+
+    The distribution over the other atoms is the conditional one, and log-weights of worlds stay what they were.
+
+    Args:
+        network: what was ground.
+        known: shape (n_atoms,): 0 false, 1 true, -1 unknown.
+
+    Raises:
+        Contradiction: if a block would have two values, or one that must have a value none.
+    """
+    known = _with_blocks(network, known)
+    decided = network.decided_true.copy()
+    place = np.cumsum(known == UNKNOWN, dtype=np.int32) - 1
+    state = _State(known, place, decided)
+    clauses: list[Clauses] = []
+    for block in network.clauses:
+        clauses += _clauses(block, state)
+    tables: list[Tables] = []
+    for table_block in network.tables:
+        new_clauses, new_tables = _tables(table_block, state)
+        clauses, tables = clauses + new_clauses, tables + new_tables
+    left = known == UNKNOWN
+    variable, value, cardinality, is_block = _variables(network, left, known)
+    return replace(
+        network,
+        evidence=_with_facts(network, known),
+        atoms=network.atoms[left],
+        variable=variable,
+        value=value,
+        cardinality=cardinality,
+        block=is_block,
+        clauses=_gathered(clauses),
+        tables=tuple(tables),
+        decided_true=decided,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """`known` of the old atoms, `place` of the open ones in the new network, and the counts of decided groundings."""
+
+    known: Int8
+    place: Int32
+    decided: Int64
+
+    def decide(self, weight: Int32, count: Int64) -> None:
+        """Notes groundings that have become true."""
+        np.add.at(self.decided, weight, count)
+
+
+# --- blocks and variables
+
+
+def _with_blocks(network: Network, known: Int8) -> Int8:
+    """What follows for the other atoms of a block."""
+    known = known.copy()
+    if not network.block.any():
+        return known
+    in_block = network.block[network.variable]
+    n_true = np.bincount(network.variable[in_block & (known == 1)], minlength=network.n_variables)
+    known[in_block & (n_true[network.variable] > 0) & (known == UNKNOWN)] = 0
+    n_open = np.bincount(network.variable[in_block & (known == UNKNOWN)], minlength=network.n_variables)
+    must = network.block & ~_may_be_none(network) & (n_true == 0)
+    if (n_true[network.block] > 1).any() or (must & (n_open == 0)).any():
+        wrong = np.flatnonzero((network.block & (n_true > 1)) | (must & (n_open == 0)))[0]
+        name, _ = network.evidence.atom_at(int(network.atoms[np.flatnonzero(network.variable == wrong)[0]]))
+        predicate = network.evidence.predicates[name]
+        found = "two true values" if n_true[wrong] > 1 else "no value left"
+        raise Contradiction([Diagnostic("E401", f"a block of {predicate} has {found}", predicate.span)])
+    known[in_block & (must & (n_open == 1))[network.variable] & (known == UNKNOWN)] = 1
+    return known
+
+
+def _may_be_none(network: Network) -> Bool:
+    n_atoms = np.bincount(network.variable, minlength=network.n_variables)
+    return network.block & (network.cardinality > n_atoms)
+
+
+def _variables(network: Network, left: Bool, known: Int8) -> tuple[Int32, Int32, Int32, Bool]:
+    kept = np.zeros(network.n_variables, np.bool_)
+    kept[network.variable[left]] = True
+    number = np.cumsum(kept, dtype=np.int32) - 1
+    old = network.variable[left]
+    variable = number[old]
+    order = np.lexsort((network.value[left], variable))
+    start = np.searchsorted(variable[order], np.arange(int(kept.sum())))
+    within = np.empty(len(variable), np.int64)
+    within[order] = np.arange(len(variable)) - start[variable[order]]
+    none = _may_be_none(network)
+    n_left = np.bincount(old, minlength=network.n_variables)
+    cardinality = np.where(network.block, n_left + none, 2)
+    value = np.where(network.block[old], within + none[old], 1)
+    return variable, value.astype(np.int32), cardinality[kept].astype(np.int32), network.block[kept]
+
+
+def _with_facts(network: Network, known: Int8) -> Evidence:
+    """The evidence with the atoms that have become known."""
+    evidence, index = network.evidence, np.flatnonzero(known != UNKNOWN)
+    facts = dict(evidence.facts)
+    for name, low in evidence.first_atom().items():
+        sizes = evidence.sizes(name)
+        high = low + int(np.prod(sizes, dtype=object))
+        mine = index[(network.atoms[index] >= low) & (network.atoms[index] < high)]
+        if not len(mine):
+            continue
+        number = network.atoms[mine] - low
+        arguments = np.empty((len(mine), len(sizes)), np.int32)
+        for i in reversed(range(len(sizes))):
+            number, arguments[:, i] = np.divmod(number, sizes[i])
+        old = facts[name]
+        rows = np.concatenate([old.arguments, arguments])
+        truth = np.concatenate([old.truth, known[mine] == 1])
+        order = np.lexsort(tuple(reversed(rows.T))) if rows.shape[1] else np.arange(len(rows))
+        facts[name] = Facts(np.zeros(len(rows), np.int32), rows[order], truth[order])
+    return replace(evidence, facts=facts)
+
+
+# --- factors
+
+
+def _clauses(block: Clauses, state: _State) -> list[Clauses]:
+    atom = np.abs(block.literals) - 1
+    value = state.known[atom]
+    is_open = value == UNKNOWN
+    satisfied = (~is_open & ((value == 1) == (block.literals > 0))).any(axis=1)
+    n_open = is_open.sum(axis=1)
+    now_true = satisfied != block.negated if not block.negated else ~satisfied & (n_open == 0)
+    state.decide(block.weight[now_true], block.count[now_true])
+    found = []
+    for n in np.unique(n_open[~satisfied & (n_open > 0)]).tolist():
+        rows = np.flatnonzero(~satisfied & (n_open == n))
+        columns = np.argsort(~is_open[rows], axis=1, kind="stable")[:, :n]
+        literals = np.take_along_axis(block.literals[rows], columns, 1)
+        moved = (state.place[np.abs(literals) - 1] + 1) * np.sign(literals)
+        found.append(Clauses(moved.astype(np.int32), block.weight[rows], block.count[rows], block.negated))
+    return found
+
+
+def _tables(block: Tables, state: _State) -> tuple[list[Clauses], list[Tables]]:
+    value = state.known[block.atoms]
+    code = (value.astype(np.int64) + 1) @ (3 ** np.arange(value.shape[1], dtype=np.int64))
+    clauses: list[Clauses] = []
+    tables: list[Tables] = []
+    for pattern in np.unique(code).tolist():
+        rows = np.flatnonzero(code == pattern)
+        index = tuple(slice(None) if v == UNKNOWN else int(v) for v in value[rows[0]].tolist())
+        open_columns = tuple(np.flatnonzero(value[rows[0]] == UNKNOWN).tolist())
+        shape = table_shape(open_columns, np.asarray(block.truth[index]))
+        weight, count = block.weight[rows], block.count[rows]
+        if isinstance(shape, Decided):
+            if shape.truth:
+                state.decide(weight, count)
+            continue
+        atoms = state.place[block.atoms[rows][:, list(shape.atoms)]]
+        if isinstance(shape, ClauseShape):
+            literals = ((atoms + 1) * np.where(shape.signs, 1, -1)).astype(np.int32)
+            order = np.argsort(np.abs(literals), axis=1)
+            clauses.append(Clauses(np.take_along_axis(literals, order, 1), weight, count, shape.negated))
+        else:
+            tables.append(Tables(atoms.astype(np.int32), shape.truth, weight, count))
+    return clauses, tables
+
+
+def _gathered(blocks: Sequence[Clauses]) -> tuple[Clauses, ...]:
+    """One block for each length and sign, equal rows merged."""
+    by_kind: dict[tuple[int, bool], list[Clauses]] = {}
+    for block in blocks:
+        by_kind.setdefault((block.literals.shape[1], block.negated), []).append(block)
+    gathered = []
+    for (_, negated), members in sorted(by_kind.items()):
+        columns = np.concatenate([m.literals for m in members])
+        weight, count = (np.concatenate([getattr(m, name) for m in members]) for name in ("weight", "count"))
+        gathered.append(Clauses(*merged_rows(columns, weight, count), negated))
+    return tuple(gathered)
