@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from mlnlite.ground.network import Network as Network
     from mlnlite.infer.answer import map_state as map_state
     from mlnlite.infer.answer import marginal as marginal
+    from mlnlite.infer.session import Session as Session
+    from mlnlite.infer.session import compile as compile
     from mlnlite.learn.evaluate import Evaluation as Evaluation
     from mlnlite.learn.evaluate import evaluate as evaluate
     from mlnlite.learn.learned import LearnedModel as LearnedModel
@@ -54,6 +56,8 @@ _HOMES = {
     "Network": "mlnlite.ground.network",
     "map_state": "mlnlite.infer.answer",
     "marginal": "mlnlite.infer.answer",
+    "Session": "mlnlite.infer.session",
+    "compile": "mlnlite.infer.session",
     "Evaluation": "mlnlite.learn.evaluate",
     "evaluate": "mlnlite.learn.evaluate",
     "LearnedModel": "mlnlite.learn.learned",

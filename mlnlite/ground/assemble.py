@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import prod
 from typing import TypeAlias
 
 import numpy as np
@@ -148,7 +149,7 @@ def _unknown(atoms: Int64, evidence: Evidence) -> Int64:
 def atom_range(predicate: Predicate, evidence: Evidence) -> tuple[int, int]:
     """Numbers of the first atom of a predicate, and of the first after it."""
     low = evidence.first_atom()[predicate.name]
-    return low, low + int(np.prod(evidence.sizes(predicate.name), dtype=object))
+    return low, low + prod(evidence.sizes(predicate.name))
 
 
 def _with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import prod
 
 import numpy as np
 
@@ -256,7 +257,7 @@ def _decided(source: Source, atom: AtomRef) -> bool:
 def strides(evidence: Evidence, predicate: str) -> list[int]:
     """Factor of each argument in an atom's number."""
     sizes = evidence.sizes(predicate)
-    return [int(np.prod(sizes[i + 1 :], dtype=object)) for i in range(len(sizes))]
+    return [prod(sizes[i + 1 :]) for i in range(len(sizes))]
 
 
 def with_number(plan: Plan, evidence: Evidence, schema: AtomSchema, name: str) -> Plan:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +126,7 @@ def _with_facts(network: Network, known: Int8) -> Evidence:
     facts = dict(evidence.facts)
     for name, low in evidence.first_atom().items():
         sizes = evidence.sizes(name)
-        high = low + int(np.prod(sizes, dtype=object))
+        high = low + prod(sizes)
         mine = index[(network.atoms[index] >= low) & (network.atoms[index] < high)]
         if not len(mine):
             continue

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,4 +181,4 @@ def _groundings_of_a_row(source: Source) -> int:
         for v in source.formula.free
         if v not in source.keys
     ]
-    return int(np.prod(sizes, dtype=object))
+    return prod(sizes)

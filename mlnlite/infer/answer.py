@@ -59,7 +59,13 @@ def marginal(
         LimitReached: if an exact answer would need more than the limit.
     """
     asked = _ask(model, evidence, query, closed_world, engine)
-    network, question = asked.network, asked.question
+    return marginals_for(asked.network, asked.question, width_limit, asked.seconds)
+
+
+def marginals_for(
+    network: Network, question: Question, width_limit: int = WIDTH_LIMIT, ground_seconds: float = 0.0
+) -> Marginals:
+    """Answers a question about a network; see `marginal`."""
     index, truth = _locate(network, question.atoms)
     start = perf_counter()
     unknown = index >= 0
@@ -75,7 +81,7 @@ def marginal(
         probability = np.concatenate([probability, of_formulas])
         names += [f.text for f in question.formulas]
         methods += ["elimination"] * len(expressions)
-    seconds = {"ground": asked.seconds, "infer": perf_counter() - start}
+    seconds = {"ground": ground_seconds, "infer": perf_counter() - start}
     return Marginals(
         names=tuple(names),
         probabilities=probability,
@@ -118,7 +124,21 @@ def map_state(
         LimitReached: if there is no answer within the limits.
     """
     asked = _ask(model, evidence, query, closed_world, engine)
-    network, question = asked.network, asked.question
+    return map_state_for(
+        asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, ground_seconds=asked.seconds
+    )
+
+
+def map_state_for(
+    network: Network,
+    question: Question,
+    *,
+    method: Method = "auto",
+    time_limit: float | None = None,
+    seed: int = 0,
+    ground_seconds: float = 0.0,
+) -> MapState:
+    """Answers a question about the most probable world of a network; see `map_state`."""
     if question.formulas:
         hint = "ask for atoms or predicates; the probability of a formula is a question for `marginal`"
         raise QueryMistake(f"the most probable world has atoms, not formulas: {question.formulas[0].text}", hint)
@@ -127,7 +147,7 @@ def map_state(
     index, truth = _locate(network, question.atoms)
     truth[index >= 0] = best.truth[index[index >= 0]]
     methods = [best.component_method[best.component[i]] if i >= 0 else EVIDENCE for i in index.tolist()]
-    seconds = {"ground": asked.seconds, "infer": perf_counter() - start}
+    seconds = {"ground": ground_seconds, "infer": perf_counter() - start}
     return MapState(
         names=tuple(_texts(network.evidence, question.atoms)),
         truth=truth,

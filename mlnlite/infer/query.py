@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import prod
 from typing import assert_never
 
 import numpy as np
@@ -97,7 +98,7 @@ def question_of(query: str | Sequence[str], model: Model, evidence: Evidence) ->
 
 def _atoms_of_predicate(predicate: Predicate, evidence: Evidence) -> Int64:
     ids = [np.flatnonzero(evidence.present[t][0]) for t in predicate.types]
-    n = int(np.prod([len(i) for i in ids], dtype=object))
+    n = prod([len(i) for i in ids])
     if n > MOST_ROWS:
         hint = f"ask for fewer: {predicate.name}(Constant, ...)"
         raise QueryMistake(f"{predicate.name} has {n:,} atoms; at most {MOST_ROWS:,} can be asked for at once", hint)
@@ -133,7 +134,7 @@ def _groundings(formula: Formula, evidence: Evidence) -> Iterator[tuple[dict[str
     plain = without_quantifiers(formula, present)
     free = formula.free
     ranges = [present[formula.variables[v].type] for v in free]
-    n = int(np.prod([len(r) for r in ranges], dtype=object))
+    n = prod([len(r) for r in ranges])
     if n > MOST_ROWS:
         raise QueryMistake(f"the formula has {n:,} groundings; at most {MOST_ROWS:,} can be asked for at once")
     for values in product(*ranges):

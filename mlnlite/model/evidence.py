@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +32,7 @@ class Facts:
     truth: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Evidence:
     """Facts of one or more databases (worlds that have nothing to do with each other but share a model).
 
@@ -58,12 +60,16 @@ class Evidence:
         """Number of constants of each argument of a predicate."""
         return tuple(len(self.types[t].constants) for t in self.predicates[predicate].types)
 
-    def first_atom(self) -> dict[str, int]:
+    def first_atom(self) -> Mapping[str, int]:
         """Number of the first atom of each predicate: atoms are numbered predicate by predicate."""
+        return self._first_atom
+
+    @cached_property
+    def _first_atom(self) -> dict[str, int]:
         first, at = {}, 0
         for name in self.predicates:
             first[name] = at
-            at += int(np.prod(self.sizes(name), dtype=object))
+            at += prod(self.sizes(name))
         return first
 
     def atom_number(self, predicate: str, arguments: Int32) -> Int64:
@@ -96,7 +102,7 @@ class Evidence:
         texts: list[str] = []
         for name, low in self.first_atom().items():
             sizes = self.sizes(name)
-            start, stop = np.searchsorted(numbers, [low, low + int(np.prod(sizes, dtype=object))])
+            start, stop = np.searchsorted(numbers, [low, low + prod(sizes)])
             rest = numbers[start:stop] - low
             columns: list[list[str]] = []
             for type_name, size in zip(reversed(self.predicates[name].types), reversed(sizes), strict=True):
