@@ -66,7 +66,7 @@ def parse_evidence(source: Source, dialect: Dialect) -> EvidenceProgram:
 
     Args:
         source: the file.
-        dialect: the dialect of the model, for messages.
+        dialect: the dialect of the model; since facts have no variables, it makes no difference.
 
     Raises:
         SyntaxMistake: with every mistake in the file.
@@ -74,7 +74,7 @@ def parse_evidence(source: Source, dialect: Dialect) -> EvidenceProgram:
     reading = _Reading()
     file = load(source)
     reading.mistakes += file.mistakes
-    _read_file(file, dialect, reading)
+    _read_file(file, reading)
     if reading.mistakes:
         raise SyntaxMistake(reading.mistakes)
     n_databases = reading.database + (not reading.separator)
@@ -88,14 +88,14 @@ def _tables(reading: _Reading) -> Iterator[FactTable]:
         yield FactTable(predicate, rows.columns, rows.truth, rows.database, rows.offset)
 
 
-def _read_file(file: File, dialect: Dialect, reading: _Reading) -> None:
+def _read_file(file: File, reading: _Reading) -> None:
     """Plain facts by one pattern, the stretches between them statement by statement."""
     done, text, included_at = 0, file.code.text, reading.offset
     for match in _FACT.finditer(text):
         sign, predicate, arguments = match.groups()
         start = match.start(1)
         if start - done > 1 and not text[done:start].isspace():
-            _read_between(file, done, start, dialect, reading)
+            _read_between(file, done, start, reading)
             if len(reading.mistakes) > MAX_MISTAKES:
                 return
         done = match.end()
@@ -107,7 +107,7 @@ def _read_file(file: File, dialect: Dialect, reading: _Reading) -> None:
         rows.database.append(reading.database)
         rows.offset.append(start if included_at is None else included_at)
         reading.separator = False
-    _read_between(file, done, len(text), dialect, reading)
+    _read_between(file, done, len(text), reading)
 
 
 def _rows(reading: _Reading, predicate: str, n_arguments: int) -> _Rows:
@@ -137,18 +137,18 @@ def _cut(rows: _Rows, constants: dict[str, str]) -> None:
         rows.uncut.clear()
 
 
-def _read_between(file: File, start: int, end: int, dialect: Dialect, reading: _Reading) -> None:
+def _read_between(file: File, start: int, end: int, reading: _Reading) -> None:
     for first, last in split_facts(file.code, start, end):
         if len(reading.mistakes) >= MAX_MISTAKES:
             reading.mistakes.append(mistake("E199", Span(file.code.source, first, last), limit=MAX_MISTAKES))
             return
         try:
-            _read_statement(file, first, last, dialect, reading)
+            _read_statement(file, first, last, reading)
         except SyntaxMistake as error:
             reading.mistakes += error.diagnostics
 
 
-def _read_statement(file: File, start: int, end: int, dialect: Dialect, reading: _Reading) -> None:
+def _read_statement(file: File, start: int, end: int, reading: _Reading) -> None:
     source, text = file.code.source, file.code.text[start:end]
     if text == "---":
         reading.database += 1
@@ -156,7 +156,7 @@ def _read_statement(file: File, start: int, end: int, dialect: Dialect, reading:
         return
     reading.separator = False
     if text.startswith("#"):
-        _read_include(file, start, end, dialect, reading)
+        _read_include(file, start, end, reading)
     elif text.startswith("---"):
         raise SyntaxMistake([mistake("E147", Span(source, start, end), "put `---` alone on its line", found=text)])
     elif _TYPE.match(text):
@@ -179,13 +179,13 @@ def _truth(fact: Fact) -> bool:
     raise SyntaxMistake([mistake("E148", fact.span, hint, found=f"{fact.truth:g}")])
 
 
-def _read_include(file: File, start: int, end: int, dialect: Dialect, reading: _Reading) -> None:
+def _read_include(file: File, start: int, end: int, reading: _Reading) -> None:
     text, span = file.code.text[start:end], Span(file.code.source, start, end)
     if start in file.included:
         included = file.included[start][1]
         if included:
             outer, reading.offset = reading.offset, start if reading.offset is None else reading.offset
-            _read_file(included, dialect, reading)
+            _read_file(included, reading)
             reading.offset = outer
     elif ANY_INCLUDE.match(text):
         hint = 'write `#include "file.db"`'

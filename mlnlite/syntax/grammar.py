@@ -1,21 +1,23 @@
 """One statement of text to one node of the tree, by the grammars in `grammars/`.
 
-No type of the parser library leaves this module.
+No type of the parser library leaves this module. It is imported when the first statement is parsed: that takes as long
+as all else that a short command does.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
-
-from lark import Lark, Token, Tree
-from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
+from typing import TYPE_CHECKING, Any
 
 from mlnlite.errors import SyntaxMistake
 from mlnlite.syntax.build import BUILDERS
 from mlnlite.syntax.explain import Failure, explain
 from mlnlite.syntax.nesting import refuse_deep_nesting
 from mlnlite.syntax.place import Language, Place
+
+if TYPE_CHECKING:
+    from lark import Lark, Token, Tree
+    from lark.exceptions import UnexpectedInput
 
 _STARTS: dict[Language, tuple[str, ...]] = {
     "standard": ("standard_statement", "standard_formula", "declaration", "type_declaration", "weight"),
@@ -26,6 +28,8 @@ _STARTS: dict[Language, tuple[str, ...]] = {
 
 @cache
 def _parser(language: Language) -> Lark:
+    from lark import Lark
+
     return Lark.open_from_package(
         "mlnlite.grammars",
         "evidence.lark" if language == "evidence" else "mln.lark",
@@ -45,6 +49,8 @@ def parse_node(rule: str, text: str, place: Place, language: Language) -> Any:  
     Raises:
         SyntaxMistake: the text does not follow the rule; one diagnostic.
     """
+    from lark.exceptions import UnexpectedInput
+
     refuse_deep_nesting(text, place)
     try:
         tree = _parser(language).parse(text, start=rule)
@@ -55,6 +61,8 @@ def parse_node(rule: str, text: str, place: Place, language: Language) -> Any:  
 
 
 def _where(error: UnexpectedInput, end: int) -> tuple[int, set[str]]:
+    from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+
     state: Any = error.interactive_parser
     accepted = set(state.accepts()) or {"$END"}
     if isinstance(error, UnexpectedToken):
@@ -65,6 +73,8 @@ def _where(error: UnexpectedInput, end: int) -> tuple[int, set[str]]:
 
 def _build(tree: Tree[Token], place: Place) -> Any:  # noqa: ANN401
     """Bottom up and without recursion, so that depth costs no stack."""
+    from lark import Tree
+
     built: dict[int, Any] = {}
     for node in tree.iter_subtrees():
         children = [built[id(child)] if isinstance(child, Tree) else child for child in node.children]

@@ -16,6 +16,7 @@ _GOES_ON = ("^", "=>", "=", "!", ",", "(", "{", " v", ")v", "->", "&", "|", " an
 # A line of evidence, or all lines of a type.
 _FACT_LINE = re.compile(r"[^\W\d][\w'-]*[ \t]*=[ \t]*\{[^{}()=]*\}[^\n]*|\S[^\n]*")
 _EQUALS_V = re.compile(r"=\s*v$")
+_QUANTIFIER = re.compile(r"\b(?i:exists?|forall)\s+[?\w',\s]+$")
 _NEW_STATEMENT = re.compile(
     r"#|@|\*\w|---|\w+\s*=\s*\{"  # a directive, a fixed weight, a closed predicate, a separator, a type
     r"|(?:[-+]?[.\d][^\s(),]*|(?:log|logx|logit|ln|exp|sqrt)\(\S*\))\s+[!(?]*[^\W\d]"  # a weight and a formula
@@ -59,7 +60,9 @@ def _unclosed(source: Source) -> Iterator[Diagnostic]:
 
 
 def _goes_on(text: str) -> bool:
-    return text.endswith(_GOES_ON) and not _EQUALS_V.search(text)
+    if text.endswith(_GOES_ON):
+        return not _EQUALS_V.search(text)
+    return text[-1] != ")" and _QUANTIFIER.search(text) is not None
 
 
 def split_statements(code: Code) -> Iterator[tuple[int, int]]:

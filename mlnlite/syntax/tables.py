@@ -6,6 +6,7 @@ grammar; if what was cut out are constants for the grammar too, all further line
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -64,7 +65,7 @@ class Gathering:
         items: the statements so far; a group stands where its first formula stood.
         groups: the groups by shape.
         keys: for each key seen its group and filling (None: the constants as they come), or None if it must be parsed.
-        weights: the weights read so far, by text.
+        weights: the weights read so far that are more than a number, by text.
     """
 
     dialect: tree.Dialect
@@ -97,6 +98,9 @@ def read_row(gathering: Gathering, text: str, place: Place) -> bool:
 
 
 def _weight(gathering: Gathering, text: str, place: Place) -> tree.WeightExpression | None:
+    if text[-1].isdigit():
+        value = float(text)
+        return None if math.isinf(value) else tree.Number(value)
     weight = gathering.weights.get(text)
     if weight is None:
         try:

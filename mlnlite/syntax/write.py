@@ -53,7 +53,7 @@ def write_weight(weight: tree.WeightExpression) -> str:
 
 
 def write_evidence(evidence: tree.EvidenceProgram, dialect: tree.Dialect) -> str:
-    """The text of an evidence file: types first, then each database, `---` between them."""
+    """The text of an evidence file, the same in both dialects: types, then the databases, `---` between them."""
     lines = [_type(declaration) for declaration in evidence.types]
     facts: list[list[str]] = [[] for _ in range(evidence.n_databases)]
     for table in evidence.facts:
@@ -162,7 +162,7 @@ def _side(operand: tree.Formula, word: _WriteWord) -> str:
 
 
 def _number(value: float) -> str:
-    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+    return str(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(value)
 
 
 def _operand(weight: tree.WeightExpression) -> str:

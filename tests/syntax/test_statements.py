@@ -78,6 +78,14 @@ def test_a_formula_goes_on_after_a_connective_or_in_parentheses(text):
     assert read(text) == read("1 P(x) => Q(x)")
 
 
+def test_a_formula_goes_on_after_a_quantifier():
+    assert read("1 EXIST x\n  (P(x))\n2 Q(x)\n") == read("1 EXIST x (P(x))\n2 Q(x)")
+
+
+def test_a_variable_v_at_the_end_is_no_connective():
+    assert kinds(read("1 x = v\n@2 P(x)")) == ["FormulaStatement", "FormulaStatement"]
+
+
 def test_comments():
     text = "// first\n1 P(x) /* inside */ ^ Q(x) // end\n/* 2 R(x)\n   3 S(x) */\n" + '4 T("// no comment")'
     assert [s.weight for s in read(text).statements] == [Number(1), Number(4)]
