@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mlnlite.domains.handover.chain import Chain
 from mlnlite.domains.handover.collision import hand_is_free, hold, is_free, thing_is_free
@@ -19,7 +20,7 @@ from mlnlite.domains.handover.ik import Accept, IkSolver, damped_least_squares
 from mlnlite.domains.handover.objects import HandoverObject, region_centre
 from mlnlite.domains.handover.pose import FloatArray, Pose, compose, inverse, transform_points
 from mlnlite.domains.handover.scene import Scene
-from mlnlite.domains.handover.touch_kernel import touches
+from mlnlite.domains.handover.touch_kernel import touches, touching_turns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +67,17 @@ def _grasp_point(thing: HandoverObject, region: int) -> FloatArray:
 def human_grasp(scene: Scene, pose: Pose) -> FloatArray:
     """Where the receiver grasps an object at `pose`: g_h in the world, shape (3,) [m]."""
     return transform_points(pose, _grasp_point(scene.thing, scene.region))
+
+
+def clear_turns(scene: Scene, place: FloatArray, rotations: FloatArray, options: Options) -> NDArray[np.bool_]:
+    """Which rotations, shape (K, 3, 3), of the object at `place` (3,) [m] may keep off the receiver; shape (K,).
+
+    A quick look over all of them: what it refuses, `attempt` refuses too.
+    """
+    if not options.collisions:
+        return np.ones(len(rotations), dtype=np.bool_)
+    hits: NDArray[np.bool_] = touching_turns(scene.thing.surface.points, rotations, place, scene.world.capsules)
+    return ~hits
 
 
 def attempt(scene: Scene, grasps: GraspSet, grasp: int, pose: Pose, options: Options) -> Attempt:

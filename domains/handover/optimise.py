@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from mlnlite import Diagnostic, MlnError
 from mlnlite.domains.handover.advice import BLAMES, explain
 from mlnlite.domains.handover.costs import appropriateness
-from mlnlite.domains.handover.feasibility import Hold, attempt, human_grasp
+from mlnlite.domains.handover.feasibility import Hold, attempt, clear_turns, human_grasp
 from mlnlite.domains.handover.fields import CostField, Options, cost_field
 from mlnlite.domains.handover.grasps import GraspSet, sample_grasps
 from mlnlite.domains.handover.objects import region_points
@@ -150,9 +150,10 @@ def _search(case: _Case, costs: CostField) -> tuple[_Best | None, float]:
 def _safest(case: _Case, costs: CostField, voxel: int) -> _Best | None:
     """The pose of highest C_S at a voxel that receiver and robot can serve."""
     case.refused["voxels"] += 1
-    for k in np.argsort(-costs.safety[voxel], kind="stable"):
-        if not costs.allowed[voxel, k]:
-            continue
+    clear = clear_turns(case.scene, costs.centres[voxel], costs.rotations[voxel], case.options)
+    case.refused["collision"] += int((costs.allowed[voxel] & ~clear).sum())
+    candidates = np.flatnonzero(costs.allowed[voxel] & clear)
+    for k in candidates[np.argsort(-costs.safety[voxel, candidates], kind="stable")]:
         pose = Pose(costs.centres[voxel], costs.rotations[voxel, k])
         outcome = attempt(case.scene, case.grasps, costs.grasp, pose, case.options)
         case.refused["calls"] += outcome.calls

@@ -5,7 +5,9 @@ A cheap first test: it never reports a collision that is none, and what it lets 
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from mlnlite.domains.handover.pose import FloatArray
 
@@ -36,6 +38,17 @@ def touches(points: FloatArray, rotation: FloatArray, position: FloatArray, caps
             if _squared(capsules[c], x, y, z) < limit:
                 return True
     return False
+
+
+@njit(cache=True)
+def touching_turns(
+    points: FloatArray, rotations: FloatArray, position: FloatArray, capsules: FloatArray
+) -> NDArray[np.bool_]:
+    """`touches` for each of the rotations, shape (k, 3, 3), at one position; shape (k,)."""
+    out = np.empty(rotations.shape[0], dtype=np.bool_)
+    for k in range(rotations.shape[0]):
+        out[k] = touches(points, rotations[k], position, capsules)
+    return out
 
 
 @njit(cache=True)

@@ -1,0 +1,75 @@
+"""Time of one optimisation: 100 random scenes x 4 mobility levels x 2 robots, 15^3 voxels x 8 orientations.
+
+Run: python benchmarks/bench_handover.py [scenes]. CPU seconds of one core; kernels are compiled before it starts.
+`fresh`: scene, grasps of an object not met before, optimisation. `warm`: the optimisation again.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from time import process_time
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+
+from mlnlite.domains.handover.grasps import sample_grasps
+from mlnlite.domains.handover.objects import object_names, read_object
+from mlnlite.domains.handover.optimise import optimise
+from mlnlite.domains.handover.receiver import Body, read_receiver
+from mlnlite.domains.handover.scene import Layout, make_scene
+
+LEVELS = ("H", "H-M", "L-M", "L")
+ROBOTS = ("pr2", "panda")
+
+
+def draw(seed):
+    """Object, task, body and an offset of the hand [m]."""
+    rng = np.random.default_rng(seed)
+    name = object_names()[rng.integers(32)]
+    tasks = read_object(name).affordances
+    task = tasks[rng.integers(len(tasks))][0]
+    posture = ("standing", "seated")[rng.integers(2)]
+    sex = ("male", "female")[rng.integers(2)]
+    body = Body(round(rng.uniform(1.55, 1.90), 2), round(rng.uniform(50, 95), 1), sex, posture=posture)
+    return name, task, body, rng.uniform(-0.03, 0.03, 3)
+
+
+def run(seed, level, robot):
+    """CPU seconds fresh and warm, and the result."""
+    name, task, body, offset = draw(seed)
+    receiver = read_receiver(level, body)
+    hand = make_scene(name, task, receiver, robot).hand.position + offset
+    optimise(make_scene("marker", "to_write", receiver, robot))
+    sample_grasps.cache_clear()
+    start = process_time()
+    scene = make_scene(name, task, receiver, robot, layout=Layout(hand=hand))
+    optimise(scene)
+    fresh, start = process_time() - start, process_time()
+    result = optimise(scene)
+    return fresh, process_time() - start, result
+
+
+def main():
+    n = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    rows = {(robot, level): [run(seed, level, robot) for seed in range(n)] for robot in ROBOTS for level in LEVELS}
+    columns = f"{'fresh p50':>10}{'p95':>8}{'warm p50':>10}{'p95':>8}{'max':>8}{'IK p50':>8}{'max':>6}  status"
+    print(f"{'robot':<8}{'level':<6}{columns}")
+    for (robot, level), found in rows.items():
+        print(f"{robot:<8}{level:<6}{summary(found)}")
+    print(f"{'all':<14}{summary([row for found in rows.values() for row in found])}")
+
+
+def summary(found):
+    """One line of the table."""
+    fresh, warm = (np.array([row[i] for row in found]) for i in (0, 1))
+    calls = np.array([row[2].ik_calls for row in found])
+    states = [row[2].status for row in found]
+    counts = ", ".join(f"{name} {states.count(name)}" for name in dict.fromkeys(states))
+    a, b, c, d = np.percentile(fresh, 50), np.percentile(fresh, 95), np.percentile(warm, 50), np.percentile(warm, 95)
+    return f"{a:>10.3f}{b:>8.3f}{c:>10.3f}{d:>8.3f}{warm.max():>8.3f}{np.median(calls):>8.0f}{calls.max():>6}  {counts}"
+
+
+if __name__ == "__main__":
+    main()
