@@ -26,7 +26,7 @@ Method = Literal["auto", "ve", "wcsp", "ilp"]
 SAT = "satisfiability"
 _FIRST_TRY = 5.0
 _CHEAP = 1 << 21
-_CHEAP_IN_ALL = 1 << 24
+_CHEAP_IN_ALL = 1 << 25
 
 
 @dataclass(frozen=True, slots=True)
