@@ -25,7 +25,12 @@ def engine_named(name: str) -> Engine:
     return ENGINES[name]()
 
 
-def engine_for(tables: Tables) -> Engine:
-    """The engine for inputs of this size."""
+def engine_for(tables: Tables, *, memory: int | None = None) -> Engine:
+    """The engine for inputs of this size.
+
+    Args:
+        tables: what the plans will draw on.
+        memory: [byte] that a database may use; None for most of what the machine has.
+    """
     n_rows = sum(len(columns[0]) for columns in tables.values() if columns)
-    return NumpyEngine() if n_rows <= SMALL else DuckDBEngine()
+    return NumpyEngine() if n_rows <= SMALL and memory is None else DuckDBEngine(memory)

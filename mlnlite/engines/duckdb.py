@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+from weakref import finalize
+
 import numpy as np
 
 from mlnlite.engines.plan import Plan, Relation, Run, Tables, columns_of
 from mlnlite.engines.sql import query, quoted
+from mlnlite.errors import LimitReached
+
+if TYPE_CHECKING:
+    from duckdb import DuckDBPyConnection
 
 
+@dataclass(frozen=True, slots=True)
 class DuckDBEngine:
-    """Runs plans as SQL in an in-memory database of its own."""
+    """Runs plans as SQL in an in-memory database of its own.
+
+    Attributes:
+        memory: [byte] that the database may use before it spills to disk, and then fails; None for most of what the
+            machine has.
+        scratch: folder for what it spills; None for a temporary one, removed at the end.
+    """
+
+    memory: int | None = None
+    scratch: str | None = None
 
     def load(self, tables: Tables) -> Run:
         """What runs plans over these tables, which are copied into the database (it wants their statistics)."""
@@ -18,13 +37,26 @@ class DuckDBEngine:
         connection = duckdb.connect()
         connection.execute("SET enable_progress_bar = false")
         connection.execute("SET preserve_insertion_order = false")
+        scratch = TemporaryDirectory(prefix="mlnlite-", dir=self.scratch)
+        connection.execute("SET temp_directory = ?", [scratch.name])
+        if self.memory is not None:
+            connection.execute("SET memory_limit = ?", [f"{max(self.memory // 10**6, 1)}MB"])
         for name, columns in tables.items():
             connection.register("given", {f"c{i}": column for i, column in enumerate(columns)})
             connection.execute(f"CREATE TABLE {quoted(name)} AS SELECT * FROM given")
             connection.unregister("given")
 
         def run(plan: Plan) -> Relation:
-            result = connection.execute(query(plan)).fetchnumpy()
+            try:
+                result = connection.execute(query(plan)).fetchnumpy()
+            except duckdb.OutOfMemoryException as error:
+                raise LimitReached(f"a join needs more memory than the limit of {self.memory or 0:,} bytes") from error
             return {name: np.asarray(result[name], np.int64) for name in columns_of(plan)}
 
+        finalize(run, _close, connection, scratch)
         return run
+
+
+def _close(connection: DuckDBPyConnection, scratch: TemporaryDirectory[str]) -> None:
+    connection.close()
+    scratch.cleanup()

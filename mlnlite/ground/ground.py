@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.choose import engine_for
-from mlnlite.engines.plan import Column, Engine, Relation, Run
+from mlnlite.engines.plan import Column, Engine, Relation, Run, Tables
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
 from mlnlite.ground.assemble import Part, Piece, network_of
 from mlnlite.ground.compile import Compiled, Source, atom_column, bindings, column, compiled, with_atom
+from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, verify
 from mlnlite.ground.groups import Group, groups_of
 from mlnlite.ground.network import Network
 from mlnlite.ground.residual import Decided
@@ -26,8 +27,17 @@ from mlnlite.model.templates import Template
 
 Int64 = NDArray[np.int64]
 
+NO_LIMITS = Limits()
 
-def ground(model: Model, evidence: Evidence, *, query: Int64 | None = None, engine: Engine | None = None) -> Network:
+
+def ground(
+    model: Model,
+    evidence: Evidence,
+    *,
+    query: Int64 | None = None,
+    engine: Engine | None = None,
+    limits: Limits = NO_LIMITS,
+) -> Network:
     """The network of a model given evidence.
 
     Args:
@@ -35,22 +45,51 @@ def ground(model: Model, evidence: Evidence, *, query: Int64 | None = None, engi
         evidence: one database.
         query: numbers of atoms that must be in the network even if no factor touches them (known ones are left out).
         engine: what runs the plans; by default chosen by the size of the input.
+        limits: what it may take.
 
     Raises:
         QueryMistake: if the evidence has several databases, or a formula has no weight.
         Contradiction: if evidence makes a hard formula false.
-        LimitReached: if a ground formula has no sensible representation.
+        LimitReached: if a ground formula has no sensible representation, or a template needs more than the limits.
     """
+    model, evidence, tables = prepared(model, evidence)
+    run = (engine or engine_for(tables, memory=limits.memory)).load(tables)
+    parts = []
+    for i, template in enumerate(model.templates):
+        source = source_of(i, template, evidence)
+        plan = plan_of(source)
+        if isinstance(plan, bool):
+            parts.append(_constant(source, template, truth=plan))
+            continue
+        if limits != NO_LIMITS:
+            verify(forecast(template, plan.compiled, tables), source, limits)
+        parts.append(_grounded(source, template, plan, run))
+    return network_of(model, evidence, parts, query)
+
+
+def forecasts(model: Model, evidence: Evidence) -> list[Forecast]:
+    """What grounding will take, template by template, without doing it. Raises as `ground`."""
+    model, evidence, tables = prepared(model, evidence)
+    found = []
+    for i, template in enumerate(model.templates):
+        plan = plan_of(source_of(i, template, evidence))
+        found.append(
+            Forecast(template, 0.0, 0.0, 0.0, 0.0)
+            if isinstance(plan, bool)
+            else forecast(template, plan.compiled, tables)
+        )
+    return found
+
+
+def prepared(model: Model, evidence: Evidence) -> tuple[Model, Evidence, Tables]:
+    """The model with expanded templates, the evidence completed, and both as tables. Raises as `ground`."""
     if evidence.n_databases != 1:
         hint = "choose one of them: `one_database(evidence, 0)`, or `--database 1` on the command line"
         raise QueryMistake(f"the evidence has {evidence.n_databases} databases, and a question is about one", hint)
     _verify_weights(model)
     evidence = completed(evidence)
     model = replace(model, templates=tuple(t.expanded(evidence.types) for t in model.templates))
-    tables = {**tables_of(evidence), **row_tables(model)}
-    run = (engine or engine_for(tables)).load(tables)
-    parts = [_grounded(source_of(i, t, evidence), t, run) for i, t in enumerate(model.templates)]
-    return network_of(model, evidence, parts, query)
+    return model, evidence, {**tables_of(evidence), **row_tables(model)}
 
 
 def _verify_weights(model: Model) -> None:
@@ -78,23 +117,44 @@ def source_of(index: int, template: Template, evidence: Evidence, world: str | N
     return Source(formula, evidence, template.keys, f"rows:{index}", len(template.rows), world)
 
 
-def _grounded(source: Source, template: Template, run: Run) -> Part:
+@dataclass(frozen=True, slots=True)
+class TemplatePlan:
+    """How to list the open groundings of a template.
+
+    Attributes:
+        compiled: the plan.
+        lists_true: it lists where the formula can be true; otherwise where it can be false.
+        false: disjoint cubes that cover where the formula is false.
+    """
+
+    compiled: Compiled
+    lists_true: bool
+    false: tuple[Cube, ...]
+
+
+def plan_of(source: Source) -> TemplatePlan | bool:
+    """The plan of a formula, or the truth value that it always has."""
     body = source.formula.body
     false, true = cubes(body, False), cubes(body, True)
-    lists_true = len(true) < len(false)
     if not (false and true):
-        return _constant(source, template, truth=bool(true))
-    plan = compiled(source, true if lists_true else false, tuple(dict.fromkeys(_equalities(body))))
-    rows = run(plan.plan)
+        return bool(true)
+    lists_true = len(true) < len(false)
+    equalities = tuple(dict.fromkeys(_equalities(body)))
+    return TemplatePlan(compiled(source, true if lists_true else false, equalities), lists_true, false)
+
+
+def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Run) -> Part:
+    plan = planned.compiled
     try:
+        rows = run(plan.plan)
         groups = groups_of(source.formula, plan, rows)
     except LimitReached as error:
         cause = error.diagnostics[0]
         message = f"{template.name} cannot be grounded: {cause.message}"
-        raise LimitReached([Diagnostic("E402", message, template.span, cause.hint)]) from error
-    part = _part(source, plan, rows, groups, lists_true=lists_true)
+        raise LimitReached([Diagnostic("E402", message, template.span, cause.hint or advice(source))]) from error
+    part = _part(source, plan, rows, groups, lists_true=planned.lists_true)
     if template.hard and (part.decided_false > 0).any():
-        raise _violated(template, violation(source, false, run))
+        raise _violated(template, violation(source, planned.false, run))
     return part
 
 

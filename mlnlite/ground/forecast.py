@@ -1,0 +1,101 @@
+"""What grounding will take, template by template, before it is done; and limits that name the culprit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mlnlite.engines.forecast import estimate
+from mlnlite.engines.plan import Tables
+from mlnlite.errors import Diagnostic, LimitReached
+from mlnlite.ground.compile import Compiled, Source
+from mlnlite.model.templates import Template
+
+ROWS_PER_SECOND = 2e6
+"""Ground rows a second of one core, from plan to network (measured: docs/explanation/performance.md)."""
+
+BYTES_PER_VALUE = 24
+"""Memory at the peak for each number of a ground row: engine, row columns and merged factors live side by side."""
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What one template will take.
+
+    Attributes:
+        template: it.
+        rows: about how many ground formulas it leaves open.
+        widest: rows of the largest intermediate result.
+        memory: [byte] at the peak.
+        seconds: [s] of one core.
+    """
+
+    template: Template
+    rows: float
+    widest: float
+    memory: float
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What grounding may take.
+
+    Attributes:
+        groundings: open ground formulas of one template; None for any number.
+        memory: [byte] of one template's rows, and of the database that joins them; None for what there is.
+    """
+
+    groundings: int | None = None
+    memory: int | None = None
+
+
+def forecast(template: Template, compiled: Compiled, tables: Tables) -> Forecast:
+    """The forecast for a template's plan."""
+    found = estimate(compiled.plan, tables)
+    width = len(compiled.atoms) + 2
+    return Forecast(
+        template=template,
+        rows=found.rows,
+        widest=found.widest,
+        memory=found.rows * width * BYTES_PER_VALUE,
+        seconds=found.rows / ROWS_PER_SECOND + (found.widest - found.rows) / (10 * ROWS_PER_SECOND),
+    )
+
+
+def verify(expected: Forecast, source: Source, limits: Limits) -> None:
+    """Refuses a template that would take more than the limits.
+
+    Raises:
+        LimitReached: naming the formula, its place, and what would help.
+    """
+    if limits.groundings is not None and expected.rows > limits.groundings:
+        over = f"about {expected.rows:,.0f} open groundings, and the limit is {limits.groundings:,}"
+    elif limits.memory is not None and expected.memory > limits.memory:
+        over = f"about {expected.memory / 1e6:,.0f} MB, and the limit is {limits.memory / 1e6:,.0f} MB"
+    else:
+        return
+    raise too_large(expected.template, source, over)
+
+
+def too_large(template: Template, source: Source, over: str) -> LimitReached:
+    """The error that names a template as the culprit."""
+    message = f"{template.name} needs {over}: {template.text}"
+    return LimitReached([Diagnostic("E410", message, template.span, advice(source))])
+
+
+def advice(source: Source) -> str:
+    """What would make the grounding smaller."""
+    schemas = source.formula.atoms
+    still_open = sorted({s.predicate for s in schemas if not source.is_closed(s)})
+    parts = []
+    if len(still_open) > 1:
+        parts.append(f"close the world of one of {', '.join(still_open)} if what is not a fact is false")
+    by_type: dict[str, list[str]] = {}
+    for i in source.formula.free:
+        by_type.setdefault(source.formula.variables[i].type, []).append(source.formula.variables[i].name)
+    widest = max(by_type, key=lambda t: len(by_type[t]) * len(source.evidence.types[t].constants), default=None)
+    if widest is not None and len(source.evidence.types[widest].constants) > 1:
+        n = len(source.evidence.types[widest].constants)
+        parts.append(f"{', '.join(by_type[widest])} range over {n:,} constants of {widest}: give them a narrower type")
+    parts.append("raise the limit")
+    return "; or ".join(parts)
