@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 from mlnlite.errors import Diagnostic
 from mlnlite.source import Span
@@ -16,7 +17,6 @@ from mlnlite.syntax.walk import constants_of, variables_of
 _MARKED = re.compile(r"\?\w[\w']*")
 # What a variable of the standard dialect usually looks like.
 LOOKS_VARIABLE = re.compile(r"[a-z]\d{0,2}'?")
-_QUOTE_HINT = 'write `?{0}` if it is a variable, or "{0}" in quotes if it is a constant'
 
 
 def first_marked(codes: Iterable[Code]) -> Span | None:
@@ -34,45 +34,70 @@ def wrong_dialect(marked: Span) -> Diagnostic:
     return mistake("E118", marked, "choose the dialect `prac`, or let it be found out", **words)
 
 
-def prac_mistakes(formula: tree.Formula, marked: Span | None) -> Iterator[Diagnostic]:
-    """Constants of a prac formula that must have been meant as variables.
+@dataclass(frozen=True, slots=True)
+class PracCheck:
+    """What tells variables of the standard dialect from constants of the prac dialect.
 
-    Args:
-        formula: a formula read in the prac dialect.
+    Attributes:
         marked: some variable with a question mark in the model, if there is one.
+        doubt: whether a formula without any variable may be one of the standard dialect: unless the user said which
+            dialect it is, and the model confirms it.
     """
+
+    marked: Span | None
+    doubt: bool
+
+
+def prac_mistakes(formula: tree.Formula, check: PracCheck) -> Iterator[Diagnostic]:
+    """A constant of a prac formula that must have been meant as a variable: the first one."""
     constants = [c for c in constants_of(formula) if c.span and not c.span.text.startswith('"')]
-    found = _suspicious(formula, [c.name for c in constants])
-    spans = {c.name: c.span for c in reversed(constants)}
-    yield from (_mistake(formula, name, spans[name], marked) for name in found)
+    name = _suspect(_names(formula), [c.name for c in constants], check.doubt)
+    if name is not None:
+        yield _mistake(formula, name, next(c.span for c in constants if c.name == name), check)
 
 
-def group_mistakes(group: Group, marked: Span | None) -> Iterator[Diagnostic]:
+def group_mistakes(group: Group, check: PracCheck) -> Iterator[Diagnostic]:
     """The same for the rows of a group that were not parsed one by one."""
-    names = {name for row in group.unquoted for name in row}
-    for name in _suspicious(group.shape, sorted(names)):
-        row = next(i for i, constants in enumerate(group.rows) if name in constants)
-        span = group.spans[row]
-        word = re.search(rf"(?<=[(,\s]){re.escape(name)}(?=[),\s])", span.text)
-        start, end = word.span() if word else (0, span.end - span.start)
-        yield _mistake(group.shape, name, Span(span.source, span.start + start, span.start + end), marked)
+    variables = _names(group.shape)
+    if variables and not any(variables.intersection(row) for row in group.unquoted):
+        return
+    for row in group.unquoted:
+        name = _suspect(variables, row, check.doubt)
+        if name is not None:
+            yield _mistake(group.shape, name, _place(group, row, name), check)
+            return
 
 
-def _suspicious(formula: tree.Formula, constants: Sequence[str]) -> list[str]:
-    """At most one constant: one named like a variable of the formula or, if that has none, one that looks like one."""
-    variables = {variable.name for variable in variables_of(formula)}
-    for name in constants:
-        if name in variables or (not variables and LOOKS_VARIABLE.fullmatch(name)):
-            return [name]
-    return []
+def _place(group: Group, row: Sequence[str], name: str) -> Span:
+    """Where the constant stands; the whole row if it is not found."""
+    span = group.spans[next(i for i, constants in enumerate(group.rows) if constants == row)]
+    word = re.search(rf"(?<=[(,\s]){re.escape(name)}(?=[),\s])", span.text)
+    start, end = word.span() if word else (0, span.end - span.start)
+    return Span(span.source, span.start + start, span.start + end)
 
 
-def _mistake(formula: tree.Formula, name: str, span: Span | None, marked: Span | None) -> Diagnostic:
-    hint = _QUOTE_HINT.format(name)
-    if any(variable.name == name for variable in variables_of(formula)):
+def _names(formula: tree.Formula) -> set[str]:
+    return {variable.name for variable in variables_of(formula)}
+
+
+def _suspect(variables: set[str], constants: Sequence[str], doubt: bool) -> str | None:
+    """A constant named like a variable of the formula; or, if it has none, one that looks like a variable.
+
+    `x` does so alone; `a1` only if all constants of the formula are of this kind and one of them stands twice.
+    """
+    if variables or not doubt:
+        return next((name for name in constants if name in variables), None)
+    similar = [name for name in constants if LOOKS_VARIABLE.fullmatch(name)]
+    joined = len(similar) == len(constants) > len(set(constants))
+    return next((name for name in similar if joined or not name[-1].isdigit()), None)
+
+
+def _mistake(formula: tree.Formula, name: str, span: Span | None, check: PracCheck) -> Diagnostic:
+    hint = f'write `?{name}` if it is a variable, or "{name}" in quotes if it is a constant'
+    if name in _names(formula):
         return mistake("E119", span, hint, name=name)
-    if marked is not None:
-        return mistake("E117", span, hint, bare=name, marked=marked.text, place=marked.place)
+    if check.marked is not None:
+        return mistake("E117", span, hint, bare=name, marked=check.marked.text, place=check.marked.place)
     words = {"actual": "standard", "asked": "prac", "found": name, "meaning": "would be a constant there"}
     return mistake("E118", span, hint, **words)
 

@@ -278,7 +278,11 @@ def _too_early(failure: Failure) -> Diagnostic | None:
     if opened is not None:
         hint = f"the `{failure.text[opened]}` {_where(failure, opened)} is not closed"
         return mistake("E103", span, hint, opened=failure.text[opened], expected=expected)
-    hint = "it may go on in the next line, if that is neither blank nor starts with a weight" if "a formula" in expected else ""
+    hint = (
+        "it may go on in the next line, if that is neither blank nor starts with a weight"
+        if "a formula" in expected
+        else ""
+    )
     return mistake("E102", span, hint, expected=expected)
 
 

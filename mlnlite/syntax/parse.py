@@ -8,7 +8,14 @@ from dataclasses import dataclass, field
 from mlnlite.errors import Diagnostic, SyntaxMistake
 from mlnlite.source import Source, Span
 from mlnlite.syntax import tree
-from mlnlite.syntax.dialects import constants_as_variables, first_marked, group_mistakes, prac_mistakes, wrong_dialect
+from mlnlite.syntax.dialects import (
+    PracCheck,
+    constants_as_variables,
+    first_marked,
+    group_mistakes,
+    prac_mistakes,
+    wrong_dialect,
+)
 from mlnlite.syntax.directives import Pending, read_directive
 from mlnlite.syntax.files import read_source
 from mlnlite.syntax.includes import File, load
@@ -31,13 +38,13 @@ class _Reading:
 
     Attributes:
         dialect: of the model.
-        marked: a variable with a question mark, if there is one.
+        check: what tells the dialects apart.
         declared: the first declaration of each predicate so far.
         mistakes: what was wrong so far.
     """
 
     dialect: Dialect
-    marked: Span | None
+    check: PracCheck
     declared: dict[str, tree.PredicateDeclaration] = field(default_factory=dict)
     mistakes: list[Diagnostic] = field(default_factory=list)
 
@@ -57,7 +64,8 @@ def parse_model(sources: Sequence[Source], dialect: Dialect | None = None) -> Pr
     """
     files = [load(source) for source in sources]
     marked = first_marked(code for file in files for code in file.codes())
-    reading = _Reading(dialect or ("prac" if marked else "standard"), marked)
+    check = PracCheck(marked, doubt=dialect is None or marked is None)
+    reading = _Reading(dialect or ("prac" if marked else "standard"), check)
     reading.mistakes += [diagnostic for file in files for diagnostic in file.mistakes]
     if dialect == "standard" and marked:
         raise SyntaxMistake([*reading.mistakes, wrong_dialect(marked)])
@@ -84,7 +92,7 @@ def _read_files(files: Sequence[File], reading: _Reading) -> tuple[tree.Statemen
         _read_file(file, reading, gathering)
     if reading.dialect == "prac":
         for group in gathering.groups.values():
-            reading.mistakes += group_mistakes(group, reading.marked)
+            reading.mistakes += group_mistakes(group, reading.check)
     return finish(gathering)
 
 
@@ -122,7 +130,7 @@ def _add(statement: tree.Statement, reading: _Reading, gathering: Gathering) -> 
         reading.declared.setdefault(statement.name, statement)
     if isinstance(statement, tree.FormulaStatement):
         if reading.dialect == "prac":
-            reading.mistakes += prac_mistakes(statement.formula, reading.marked)
+            reading.mistakes += prac_mistakes(statement.formula, reading.check)
         if can_gather(statement):
             add(gathering, statement)
             return

@@ -1,6 +1,6 @@
 """Each file in tests/programs/bad is refused with exactly the text beside it, `NAME.expected`.
 
-To see what a new file says, read it with `python -m tests.syntax.test_bad_programs NAME`.
+Files of the syntax and files of the check stand side by side: what a file is wrong in shows in its codes.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from mlnlite.errors import MlnError
+from mlnlite.model.check import check
 from mlnlite.syntax.evidence import parse_evidence
 from mlnlite.syntax.files import read_source
 from mlnlite.syntax.parse import parse_model
@@ -25,7 +26,7 @@ def message(name: str) -> str:
         if name.endswith(".db"):
             parse_evidence(source, "standard")
         else:
-            parse_model([source])
+            check(parse_model([source]))
     except MlnError as error:
         return str(error)
     return "accepted"

@@ -167,7 +167,9 @@ def test_both_dialects_in_one_model():
     assert codes("1 P(?x)\n2 Q(x)\n3 Q(y)\n4 Q(Anna)") == ["E117"]
     assert codes("1 P(?x)", "2 Q(x)") == ["E117"]
     assert codes("1 P(?x) ^ Q(x)") == ["E119"]
-    assert read('1 P(?x)\n2 Q("x")\n3 Q(far)\n4 R(?x, y)').dialect == "prac"
+    assert codes("1 P(?x)\n2 Q(a1, a2) ^ R(a2)\n3 Q(a1, a2) ^ R(a2)") == ["E117"]
+    assert read('1 P(?x)\n2 Q("x")\n3 Q(far)\n4 R(?x, y)\n5 S(w1, theme) ^ S(w1, s1)\n6 T(w1, s1)').dialect == "prac"
+    assert read("1 P(?x)\n2 Q(x)", dialect="prac").statements[1].formula.arguments == (Constant("x"),)
 
 
 def test_a_dialect_that_the_text_is_not_in():
