@@ -203,7 +203,11 @@ def _begin(text: str) -> str:
 
 def _declaration(place: Place, span: Span, children: Children) -> tree.PredicateDeclaration:
     closed = children[0] == "*"
-    return tree.PredicateDeclaration(str(children[closed]), tuple(_nodes(children)), closed, span)
+    name = children[closed]
+    if name.lower() in ("exist", "exists", "forall"):
+        hint = f"write `{name.upper()} x (...)`; a predicate cannot have this name"
+        raise SyntaxMistake([mistake("E127", place.token(name), hint, quantifier=name)])
+    return tree.PredicateDeclaration(str(name), tuple(_nodes(children)), closed, span)
 
 
 def _argument(place: Place, span: Span, children: Children) -> tree.Argument:

@@ -118,8 +118,8 @@ def _term_words(failure: Failure) -> str:
 
 
 def _quantifier(failure: Failure) -> Diagnostic | None:
-    match = re.search(r"\b(exists?|forall)\s*(?=\()", failure.text, re.IGNORECASE)
-    if match is None or failure.at < match.end() or failure.rule == "fact":
+    match = re.search(r"\b(exists?|forall)\s*\(\s*[\w']*\s*$", failure.text[: failure.at], re.IGNORECASE)
+    if match is None or failure.rule == "fact" or failure.found_text in ("", ",", ")"):
         return None
     variable = "?x" if failure.language == "prac" else "x"
     hint = f"write `{match[1].upper()} {variable} (...)`"
