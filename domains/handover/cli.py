@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mlnlite import MlnError
 from mlnlite.domains.handover import load
 
 if TYPE_CHECKING:
@@ -86,23 +84,24 @@ def handover() -> None:
 @click.option("--figure", type=click.Path(dir_okay=False), help="Write cost slices and a side view to an image.")
 @click.option("--view", is_flag=True, help="Show the scene in the browser until interrupted.")
 @click.option("--port", default=8080, show_default=True, help="Of the browser view.")
-def optimise(**given: Any) -> None:  # noqa: ANN401 - click passes every option by name
+@click.pass_context
+def optimise(context: click.Context, **given: Any) -> None:  # noqa: ANN401 - click passes every option by name
     """Find where to hold the object and how."""
     keys = {name: given.pop(name) for name in _Words.__slots__}
-    with _Plainly():
-        scene = _scene(_Words(**keys))
-        options = load("fields").Options(distance="surface" if given["surface"] else "point")
-        if given["method"] == "ours":
-            result = load("optimise").optimise(scene, options, exhaustive=given["exhaustive"])
-        else:
-            result = load("methods").hand_over(scene, given["method"], options)
-        found = load("optimise").require(result)
-        (_print_json if given["form"] == "json" else _print_text)(scene, result, found)
-        if given["figure"]:
-            figures = load("figures")
-            figures.save(figures.draw_configuration(scene, found, options), given["figure"])
-        if given["view"]:
-            load("viewer").serve(scene, port=given["port"])
+    context.meta["mlnlite.format"] = given["form"]
+    scene = _scene(_Words(**keys))
+    options = load("fields").Options(distance="surface" if given["surface"] else "point")
+    if given["method"] == "ours":
+        result = load("optimise").optimise(scene, options, exhaustive=given["exhaustive"])
+    else:
+        result = load("methods").hand_over(scene, given["method"], options)
+    found = load("optimise").require(result)
+    (_print_json if given["form"] == "json" else _print_text)(scene, result, found)
+    if given["figure"]:
+        figures = load("figures")
+        figures.save(figures.draw_configuration(scene, found, options), given["figure"])
+    if given["view"]:
+        load("viewer").serve(scene, port=given["port"])
 
 
 def _print_text(scene: Scene, result: Handover, found: Configuration) -> None:
@@ -142,15 +141,14 @@ def _print_json(scene: Scene, result: Handover, found: Configuration) -> None:
 @click.option("--out", type=click.Path(file_okay=False), help="Folder for effort.md and effort.png.")
 def effort(objects: str, robot: str, posture: str, out: str | None) -> None:
     """Compare the receiver's effort under methods A, B and ours at each level."""
-    with _Plainly():
-        rows = _rows(objects, robot, posture, checks=False)
-        text = load("report").effort_markdown(rows)
-        click.echo(text)
-        if out:
-            figures = load("figures")
-            Path(out).mkdir(parents=True, exist_ok=True)
-            (Path(out) / "effort.md").write_text(_EFFORT.format(robot=robot, posture=posture, table=text))
-            figures.save(figures.draw_effort(rows), Path(out) / "effort.png")
+    rows = _rows(objects, robot, posture, checks=False)
+    text = load("report").effort_markdown(rows)
+    click.echo(text)
+    if out:
+        figures = load("figures")
+        Path(out).mkdir(parents=True, exist_ok=True)
+        (Path(out) / "effort.md").write_text(_EFFORT.format(robot=robot, posture=posture, table=text))
+        figures.save(figures.draw_effort(rows), Path(out) / "effort.png")
 
 
 @handover.command()
@@ -160,12 +158,11 @@ def effort(objects: str, robot: str, posture: str, out: str | None) -> None:
 @click.option("--out", type=click.Path(file_okay=False), help="Folder for compare.md.")
 def compare(objects: str, robot: str, posture: str, out: str | None) -> None:
     """Put methods A, B and ours through the five checks on every object, level and robot."""
-    with _Plainly():
-        text = load("report").checks_markdown(_rows(objects, robot, posture, checks=True))
-        click.echo(text)
-        if out:
-            Path(out).mkdir(parents=True, exist_ok=True)
-            (Path(out) / "compare.md").write_text(_COMPARE.format(robot=robot, posture=posture, table=text))
+    text = load("report").checks_markdown(_rows(objects, robot, posture, checks=True))
+    click.echo(text)
+    if out:
+        Path(out).mkdir(parents=True, exist_ok=True)
+        (Path(out) / "compare.md").write_text(_COMPARE.format(robot=robot, posture=posture, table=text))
 
 
 def _rows(objects: str, robot: str, posture: str, *, checks: bool) -> tuple[Row, ...]:
@@ -173,19 +170,6 @@ def _rows(objects: str, robot: str, posture: str, *, checks: bool) -> tuple[Row,
     body = load("receiver").Body(posture=posture)
     rows: tuple[Row, ...] = load("report").run(names, robot.split(","), body, checks=checks)
     return rows
-
-
-class _Plainly:
-    """Prints a user's mistake and exits with 1; anything else passes through."""
-
-    def __enter__(self) -> None:
-        """Nothing to prepare."""
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        """Turns an `MlnError` into a message."""
-        if isinstance(error, MlnError):
-            click.echo(str(error), err=True)
-            sys.exit(1)
 
 
 _EFFORT = """# Effort of the receiver
@@ -201,7 +185,3 @@ _COMPARE = """# Five checks
 Written by `mlnlite handover compare --robot {robot} --posture {posture} --out docs/handover`; do not edit.
 
 {table}"""
-
-
-if __name__ == "__main__":
-    handover()

@@ -15,7 +15,7 @@ import numpy as np
 
 from mlnlite import Diagnostic
 from mlnlite.domains.handover.costs import distances, reachability, safety
-from mlnlite.domains.handover.feasibility import Hold, attempt, human_grasp
+from mlnlite.domains.handover.feasibility import Hold, attempt, clear_turns, human_grasp
 from mlnlite.domains.handover.fields import Options, cost_points, presented_direction
 from mlnlite.domains.handover.grasps import GraspSet, sample_grasps
 from mlnlite.domains.handover.optimise import Configuration, Handover, optimise, rank_grasps
@@ -89,13 +89,15 @@ def _arbitrary(grasps: GraspSet, place: FloatArray, options: Options, rng: np.ra
 
 
 def _suited(scene: Scene, grasps: GraspSet, place: FloatArray, options: Options) -> Iterator[_Candidate]:
-    """Grasps by falling C_A, the human region turned to the palm."""
-    towards = presented_direction(scene.thing, scene.region)
-    rotations = presenting_rotations(place[None], scene.hand.position, towards, options.orientations)[0]
+    """Grasps by falling C_A, the human region turned to the palm; where that meets the body, upright."""
+    towards, n = presented_direction(scene.thing, scene.region), options.orientations
+    presented = presenting_rotations(place[None], scene.hand.position, towards, n)[0]
+    rotations = np.concatenate([presented, [rotation_about(UP, 2 * np.pi * k / n) for k in range(n)]])
+    clear = np.flatnonzero(clear_turns(scene, place, rotations, options))
     ranked, _ = rank_grasps(scene, grasps)
     for rank, grasp in enumerate(ranked):
-        for k in range(options.orientations):
-            yield rank, int(grasp), k, Pose(place, rotations[k])
+        for k in clear:
+            yield rank, int(grasp), int(k), Pose(place, rotations[k])
 
 
 def _priced(scene: Scene, grasps: GraspSet, candidate: _Candidate, held: Hold, options: Options) -> Configuration:

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite import Diagnostic, MlnError
+from mlnlite import Diagnostic, LimitReached, MlnError
 from mlnlite.domains.handover.advice import BLAMES, explain
 from mlnlite.domains.handover.costs import appropriateness
 from mlnlite.domains.handover.feasibility import Hold, attempt, clear_turns, human_grasp
@@ -182,7 +182,10 @@ def require(handover: Handover) -> Configuration:
 
     Raises:
         MlnError: there is none; says which constraint is in the way and the nearest relaxation.
+        LimitReached: none was found within the limit of calls.
     """
+    if handover.configuration is None and handover.status == "limit":
+        raise LimitReached(handover.advice)
     if handover.configuration is None:
         raise MlnError(handover.advice)
     return handover.configuration

@@ -11,12 +11,12 @@ pytest.importorskip("pinocchio")
 from click.testing import CliRunner
 
 from mlnlite import MissingPart, Plugin
+from mlnlite.cli import mlnlite as command
 from mlnlite.domains import handover as package
-from mlnlite.domains.handover.cli import handover
 
 
 def _run(*words):
-    return CliRunner().invoke(handover, list(words))
+    return CliRunner().invoke(command, ["handover", *words], prog_name="mlnlite")
 
 
 def test_optimise_answers_in_words_and_in_json():
@@ -51,11 +51,16 @@ def test_other_methods_and_robots(method):
         (("--voxels", "3", "--step", "0.001"), "safety"),
     ],
 )
-def test_mistakes_are_told_and_end_with_one(words, said):
+def test_mistakes_are_told_and_end_with_two(words, said):
     found = _run("optimise", *words)
-    assert found.exit_code == 1
+    assert found.exit_code == 2
     assert said in found.output
     assert "hint" in found.output
+
+
+def test_mistakes_are_data_for_programs():
+    found = _run("optimise", "--object", "mugg", "--format", "json")
+    assert json.loads(found.output)["diagnostics"][0]["hint"] == "did you mean mug?"
 
 
 def test_effort_and_compare_write_their_pages(tmp_path):

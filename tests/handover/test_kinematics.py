@@ -19,7 +19,8 @@ twin = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(twin)
 
 ARM = """<robot name="bench_arm">
-  <link name="base"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="hand"/><link name="jaw"/>
+  <link name="base"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+  <link name="hand"/><link name="jaw"/>
   <joint name="turn" type="continuous"><parent link="base"/><child link="a"/>
     <origin xyz="0.1 0.2 0.3" rpy="0.3 -0.2 0.5"/><axis xyz="0 0 1"/></joint>
   <joint name="tilt" type="revolute"><parent link="a"/><child link="b"/>
