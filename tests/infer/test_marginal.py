@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 
 from mlnlite.errors import Contradiction
-from mlnlite.infer import marginal, parts, peel
+from mlnlite.infer import conjunctions, marginal, parts, peel
+from mlnlite.infer.map import map_of
 from mlnlite.infer.marginal import marginals_of
 from tests.networks import networks, world_weight, worlds
 
@@ -36,3 +37,19 @@ def test_marginals_equal_enumeration(net, small, fewest):
     assert answer.log_z == pytest.approx(log_z, abs=1e-9)
     np.testing.assert_allclose(answer.probability, expected, atol=1e-9)
     assert answer.exact.all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(net=networks(8))
+def test_chains_of_auxiliary_variables_change_nothing(net):
+    log_z, expected = enumerate_worlds(net)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(conjunctions, "MAX_ARITY", 2)
+        if expected is None:
+            with pytest.raises(Contradiction):
+                marginals_of(net)
+            return
+        answer, best = marginals_of(net), map_of(net)
+    assert answer.log_z == pytest.approx(log_z, abs=1e-9)
+    np.testing.assert_allclose(answer.probability, expected, atol=1e-9)
+    assert best.log_weight == pytest.approx(max(world_weight(net, t) for t in worlds(net)), abs=1e-9)
