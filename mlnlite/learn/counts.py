@@ -24,6 +24,9 @@ from mlnlite.model.templates import Template
 
 Int64 = NDArray[np.int64]
 
+DENSE = 4
+"""Sums are kept in a table if it has at most this many times as many places as there are entries."""
+
 
 @dataclass(frozen=True, slots=True)
 class Entries:
@@ -57,7 +60,7 @@ def entries(templates: Sequence[Template], evidence: Evidence, run: Run, targets
                 if schema.predicate in targets:
                     found[schema.predicate] += _counted(source, case, target, sign, first, run)
         first += len(template.weights)
-    return {name: _joined(parts) for name, parts in found.items()}
+    return {name: _joined(parts, first) for name, parts in found.items()}
 
 
 def _cases(source: Source) -> Iterator[tuple[int, Case]]:
@@ -116,19 +119,47 @@ def _plan(source: Source, case: Case, others: list[tuple[AtomSchema, bool]], tar
     return Count(plan, by)
 
 
-def _joined(parts: list[Entries]) -> Entries:
-    """All entries of a predicate, those of one atom and weight added up."""
+def _joined(parts: list[Entries], n_weights: int) -> Entries:
+    """All entries of a predicate in order, those of one atom and weight added up."""
     if not parts:
         empty = np.empty(0, np.int64)
         return Entries(empty, empty, empty, empty)
     database, atom, weight, change = (
         np.concatenate([getattr(p, name) for p in parts]) for name in ("database", "atom", "weight", "change")
     )
+    low = int(atom.min()) if len(atom) else 0
+    width = int(atom.max(initial=low)) - low + 1
+    size = (int(database.max(initial=0)) + 1) * width * n_weights
+    if size >= 2**62:
+        return _sorted(database, atom, weight, change)
+    key = (database * width + (atom - low)) * n_weights + weight
+    key, total = _added(key, change, size)
+    unit, weight = np.divmod(key, n_weights)
+    database, atom = np.divmod(unit, width)
+    return Entries(database, atom + low, weight, total)
+
+
+def _added(key: Int64, change: Int64, size: int) -> tuple[Int64, Int64]:
+    """Sums by key that are not zero, in order of keys. By a table where that is not much larger than the list."""
+    if size <= DENSE * len(key) + 1000:
+        total = np.bincount(key, change, size)
+        keys = np.flatnonzero(total)
+        return keys, total[keys].astype(np.int64)
+    order = np.argsort(key)
+    key, change = key[order], change[order]
+    starts = np.flatnonzero(np.diff(key, prepend=-1))
+    total = np.add.reduceat(change, starts)
+    keep = total != 0
+    return key[starts][keep], total[keep]
+
+
+def _sorted(database: Int64, atom: Int64, weight: Int64, change: Int64) -> Entries:
+    """The same for keys that do not fit into 64 bits."""
     order = np.lexsort((weight, atom, database))
     database, atom, weight, change = (a[order] for a in (database, atom, weight, change))
     new = np.ones(len(order), bool)
     new[1:] = (database[1:] != database[:-1]) | (atom[1:] != atom[:-1]) | (weight[1:] != weight[:-1])
     starts = np.flatnonzero(new)
-    total = np.add.reduceat(change, starts) if len(starts) else change
+    total = np.add.reduceat(change, starts)
     keep = total != 0
     return Entries(database[starts][keep], atom[starts][keep], weight[starts][keep], total[keep])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite.learn.choices import Choices
+from mlnlite.learn.merge import Choices
 
 Float = NDArray[np.float64]
 

@@ -16,9 +16,10 @@ from mlnlite.errors import Contradiction, Diagnostic, ModelMistake, QueryMistake
 from mlnlite.ground.ground import row_tables
 from mlnlite.ground.tables import tables_of
 from mlnlite.learn import likelihood
-from mlnlite.learn.choices import Choices, choices
+from mlnlite.learn.choices import choices
 from mlnlite.learn.counts import entries
 from mlnlite.learn.learned import LearnedModel
+from mlnlite.learn.merge import Choices
 from mlnlite.learn.newton import Optimum, maximise
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed

@@ -34,7 +34,7 @@ def choices_of(text, databases, engine=None):
     return expanded, evidence, found
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(model_texts(hard=False), evidence_texts(complete=True), evidence_texts(complete=True))
 def test_value_and_gradient(text, first, second):
     model, evidence, found = choices_of(text, [first, second])
@@ -53,7 +53,7 @@ def test_value_and_gradient(text, first, second):
         assert likelihood.curvature(found, point, np.eye(n)[i]) == pytest.approx(bend / step, abs=1e-5)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(model_texts(hard=False), evidence_texts(complete=True))
 def test_engines_agree(text, facts):
     values = []
