@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.ground.compile import strides
+from mlnlite.ground.merge import merged, merged_clauses
 from mlnlite.ground.network import Clauses, Network, Tables
 from mlnlite.ground.residual import ClauseShape, TableShape
 from mlnlite.model.evidence import Evidence
@@ -26,13 +27,13 @@ class Piece:
     """Ground formulas of one template that have one shape.
 
     Attributes:
-        atoms: shape (n, k), atom numbers in the order of `shape.atoms`.
+        atoms: for each of `shape.atoms` a column of atom numbers, shape (n,).
         shape: clause or table.
         row: shape (n,), row of the template.
         count: shape (n,), how many groundings.
     """
 
-    atoms: Int64
+    atoms: tuple[Int64, ...]
     shape: ClauseShape | TableShape
     row: Int64
     count: Int64
@@ -65,7 +66,7 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         query: numbers of further atoms that are to be in the network unless they are known.
     """
     asked = np.empty(0, np.int64) if query is None else _unknown(np.unique(query), evidence)
-    touched = distinct([asked, *(p.atoms for part in parts for p in part.pieces)])
+    touched = distinct([asked, *(a for part in parts for p in part.pieces for a in p.atoms)])
     atoms, block = _with_blocks(touched, evidence)
     index = index_in(atoms)
     variable, value, cardinality, is_block = _variables(atoms, block, evidence)
@@ -105,7 +106,7 @@ Index: TypeAlias = Callable[[Int64], Int32]
 
 def distinct(numbers: Sequence[Int64]) -> Int64:
     """All numbers of some arrays, each once, rising."""
-    flat = [n.ravel() for n in numbers if n.size]
+    flat = [n for n in numbers if n.size]
     if not flat:
         return np.empty(0, np.int64)
     low, high = min(int(n.min()) for n in flat), max(int(n.max()) for n in flat)
@@ -209,74 +210,39 @@ def _may_be_none(first: Int64, is_block: NDArray[np.bool_], evidence: Evidence) 
 
 
 def _clauses(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Clauses, ...]:
-    gathered: dict[tuple[int, bool], list[tuple[Int32, Int32, Int64]]] = {}
+    gathered: dict[tuple[int, bool], list[Columns]] = {}
     for part, offset in zip(parts, first, strict=False):
         for piece in part.pieces:
             if isinstance(piece.shape, ClauseShape):
-                literals = (index(piece.atoms) + np.int32(1)) * np.where(piece.shape.signs, 1, -1).astype(np.int32)
-                item = (_by_atom(literals), (piece.row + offset).astype(np.int32), piece.count)
-                gathered.setdefault((literals.shape[1], piece.shape.negated), []).append(item)
+                signs = [np.int32(1 if sign else -1) for sign in piece.shape.signs]
+                literals = [(index(a) + np.int32(1)) * sign for a, sign in zip(piece.atoms, signs, strict=True)]
+                key = (len(literals), piece.shape.negated)
+                gathered.setdefault(key, []).append((*literals, (piece.row + offset).astype(np.int32), piece.count))
     blocks = []
     for (_, negated), items in sorted(gathered.items()):
-        literals, weight, count = (np.concatenate(c) for c in zip(*items, strict=True))
-        blocks.append(Clauses(*merged_rows(literals, weight, count), negated))
+        *literals, weight, count = _joined(items)
+        blocks.append(Clauses(*merged_clauses(literals, weight, count), negated))
     return tuple(blocks)
 
 
 def _tables(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Tables, ...]:
-    gathered: dict[tuple[int, bytes], list[tuple[Int32, Int32, Int64]]] = {}
+    gathered: dict[tuple[int, bytes], list[Columns]] = {}
     for part, offset in zip(parts, first, strict=False):
         for piece in part.pieces:
             if isinstance(piece.shape, TableShape):
+                atoms = [index(a) for a in piece.atoms]
                 key = (piece.shape.truth.ndim, piece.shape.truth.tobytes())
-                gathered.setdefault(key, []).append(
-                    (index(piece.atoms), (piece.row + offset).astype(np.int32), piece.count)
-                )
+                gathered.setdefault(key, []).append((*atoms, (piece.row + offset).astype(np.int32), piece.count))
     blocks = []
     for (n_atoms, truth), items in sorted(gathered.items()):
-        columns, weight, count = (np.concatenate(c) for c in zip(*items, strict=True))
-        columns, weight, count = merged_rows(columns, weight, count)
-        blocks.append(Tables(columns, np.frombuffer(truth, np.bool_).reshape((2,) * n_atoms), weight, count))
+        *atoms, weight, count = _joined(items)
+        rows, weight, count = merged(atoms, weight, count)
+        blocks.append(Tables(rows, np.frombuffer(truth, np.bool_).reshape((2,) * n_atoms), weight, count))
     return tuple(blocks)
 
 
-def _by_atom(literals: Int32) -> Int32:
-    """The literals of each row in rising order of their atoms."""
-    if literals.shape[1] == 2:
-        swap = np.abs(literals[:, 0]) > np.abs(literals[:, 1])
-        return np.where(swap[:, None], literals[:, ::-1], literals)
-    return np.asarray(np.take_along_axis(literals, np.argsort(np.abs(literals), axis=1), 1))
+Columns: TypeAlias = tuple[NDArray[Any], ...]
 
 
-def merged_rows(columns: Int32, weight: Int32, count: Int64) -> tuple[Int32, Int32, Int64]:
-    """Equal rows with equal weights made one, counts added, in rising order."""
-    key = _packed(columns, weight)
-    order: Int64 = np.lexsort((*reversed(columns.T), weight)) if key is None else np.argsort(key)
-    columns, weight, count = columns[order], weight[order], count[order]
-    if key is not None:
-        key = key[order]
-        new = np.diff(key, prepend=key[0] - 1 if len(key) else 0) != 0
-    else:
-        new = np.ones(len(order), bool)
-        new[1:] = (weight[1:] != weight[:-1]) | (columns[1:] != columns[:-1]).any(axis=1)
-    if not new.all():
-        starts = np.flatnonzero(new)
-        columns, weight, count = columns[starts], weight[starts], np.add.reduceat(count, starts)
-    result = (np.ascontiguousarray(columns), weight, count.astype(np.int64, copy=False))
-    for array in result:
-        array.setflags(write=False)
-    return result
-
-
-def _packed(columns: Int32, weight: Int32) -> Int64 | None:
-    """One number for each row, in the order of weight and columns; None if that needs more than 63 bits."""
-    if not columns.size:
-        return None
-    low, high = int(columns.min()), int(columns.max())
-    bits = (high - low).bit_length()
-    if bits * columns.shape[1] + int(weight.max()).bit_length() > 62:
-        return None
-    key = weight.astype(np.int64)
-    for column in columns.T:
-        key = (key << bits) | (column.astype(np.int64) - low)
-    return key
+def _joined(items: Sequence[Columns]) -> list[NDArray[Any]]:
+    return list(items[0]) if len(items) == 1 else [np.concatenate(c) for c in zip(*items, strict=True)]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Contradiction, Diagnostic
-from mlnlite.ground.assemble import merged_rows
+from mlnlite.ground.merge import merged_clauses
 from mlnlite.ground.network import Clauses, Network, Tables
 from mlnlite.ground.residual import ClauseShape, Decided, table_shape
 from mlnlite.model.evidence import Evidence, Facts
@@ -197,5 +197,5 @@ def _gathered(blocks: Sequence[Clauses]) -> tuple[Clauses, ...]:
     for (_, negated), members in sorted(by_kind.items()):
         columns = np.concatenate([m.literals for m in members])
         weight, count = (np.concatenate([getattr(m, name) for m in members]) for name in ("weight", "count"))
-        gathered.append(Clauses(*merged_rows(columns, weight, count), negated))
+        gathered.append(Clauses(*merged_clauses(list(columns.T), weight, count), negated))
     return tuple(gathered)

@@ -225,7 +225,7 @@ def _part(source: Source, plan: Compiled, rows: Relation, groups: list[Group], *
             listed[group.shape.truth] += sums
             continue
         open_ += sums
-        atoms: Int64 = np.column_stack([rows[atom_column(i)][group.index] for i in group.shape.atoms])
+        atoms = tuple(rows[atom_column(i)][group.index] for i in group.shape.atoms)
         pieces.append(Piece(atoms, group.shape, row[group.index], count[group.index]))
     if lists_true:
         decided_true, decided_false = listed[True], total - open_ - listed[True]

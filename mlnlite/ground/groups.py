@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -21,9 +21,9 @@ Int64 = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Rows (their indices) that leave the same shape."""
+    """Rows (their indices; all of them, if a slice) that leave the same shape."""
 
-    index: Int64
+    index: Int64 | slice
     shape: Shape
 
 
@@ -46,17 +46,18 @@ def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
             code, base = code * 3 + column, base * 3
     groups = []
     for index in _equal_rows(code):
-        known, merged = _meaning({key: int(column[index[0]]) for key, column in features.items()})
+        first = 0 if isinstance(index, slice) else index[0]
+        known, merged = _meaning({key: int(column[first]) for key, column in features.items()})
         body = simplified(renamed(formula.body, merged), {**plan.known, **known})
         groups.append(Group(index, shape_of(body)))
     return groups
 
 
-def _equal_rows(code: Int64) -> list[Int64]:
+def _equal_rows(code: Int64) -> Sequence[Int64 | slice]:
     if len(code) == 0:
         return []
     if (code == code[0]).all():
-        return [np.arange(len(code))]
+        return [slice(None)]
     order = np.argsort(code, kind="stable")
     return list(np.split(order, np.flatnonzero(np.diff(code[order])) + 1))
 
