@@ -6,6 +6,7 @@ BIN := $(VENV)/bin
 OUT ?= out
 EXAMPLES := docs/examples
 CODE := mlnlite domains tests benchmarks
+TREE := build/tree# the package as it is installed: domains/ and grammars/ inside
 
 .PHONY: demo test lint format benchmark clean help
 .DEFAULT_GOAL := help
@@ -29,8 +30,9 @@ test: $(VENV)/.installed-dev  ## run all tests
 lint: $(VENV)/.installed-dev  ## format check, lint, types, import contract
 	$(BIN)/ruff format --check $(CODE)
 	$(BIN)/ruff check $(CODE)
-	$(BIN)/mypy mlnlite domains
-	$(BIN)/lint-imports
+	@rm -rf $(TREE) && mkdir -p $(TREE) && cp -Rp mlnlite $(TREE) && cp -Rp domains grammars $(TREE)/mlnlite
+	cd $(TREE) && $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p mlnlite
+	cd $(TREE) && PYTHONPATH=. $(abspath $(BIN))/lint-imports --config $(CURDIR)/pyproject.toml --no-cache
 
 format: $(VENV)/.installed-dev  ## put the code into shape
 	$(BIN)/ruff format $(CODE)
