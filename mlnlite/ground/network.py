@@ -55,6 +55,26 @@ class Tables:
 
 
 @dataclass(frozen=True, slots=True)
+class Counts:
+    """Ground formulas whose number of true groundings depends on a count only.
+
+    "At most one advisor" over all pairs of 50 candidates is 1,225 clauses, or one function of how many are advisors.
+
+    Attributes:
+        literals: shape (n, m), each row sorted by atom, no atom twice.
+        true: shape (m + 1,), number of true groundings where j of the literals are true; its largest entry is the
+            number of groundings.
+        weight: shape (n,), index of each one's weight.
+        count: shape (n,), how often each grounding is there.
+    """
+
+    literals: Int32
+    true: Int64
+    weight: Int32
+    count: Int64
+
+
+@dataclass(frozen=True, slots=True)
 class Network:
     """Variables over unknown atoms, and factors.
 
@@ -72,6 +92,7 @@ class Network:
         block: shape (n_variables,), whether the variable is a block.
         clauses: clause factors.
         tables: table factors.
+        counts: counting factors.
         weights: shape (n_weights,), log weights, `inf` for hard.
         template: shape (n_weights,), index of each weight's template in `model.templates`.
         decided_true: shape (n_weights,), number of groundings that evidence makes true.
@@ -91,6 +112,7 @@ class Network:
     template: Int32
     decided_true: Int64
     n_groundings: Int64
+    counts: tuple[Counts, ...] = ()
 
     @property
     def n_atoms(self) -> int:
@@ -110,9 +132,13 @@ class Network:
             total += np.bincount(clauses.weight, clauses.count, len(total)).astype(np.int64)
         for tables in self.tables:
             total += np.bincount(tables.weight, tables.count, len(total)).astype(np.int64)
+        for counts in self.counts:
+            largest = int(counts.true.max(initial=0))
+            total += largest * np.bincount(counts.weight, counts.count, len(total)).astype(np.int64)
         return total
 
     @property
     def n_factors(self) -> int:
         """Number of distinct ground formulas that evidence leaves open."""
-        return sum(len(c.literals) for c in self.clauses) + sum(len(t.atoms) for t in self.tables)
+        n_clauses = sum(len(c.literals) for c in self.clauses)
+        return n_clauses + sum(len(t.atoms) for t in self.tables) + sum(len(c.literals) for c in self.counts)

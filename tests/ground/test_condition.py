@@ -56,5 +56,7 @@ def test_propagation_keeps_the_distribution(text, facts):
         if before > -np.inf:
             forced = set(network.atoms) - set(smaller.atoms)
             facts_now = brute.facts(smaller.evidence)
-            assert all(world[network.evidence.atom_at(int(a))] == facts_now[smaller.evidence.atom_at(int(a))] for a in forced)
+            assert all(
+                world[network.evidence.atom_at(int(a))] == facts_now[smaller.evidence.atom_at(int(a))] for a in forced
+            )
             assert log_weight(smaller, truth_of(smaller, world)) == before

@@ -1,0 +1,96 @@
+"""The groundings that a given world makes false, as a query: for formulas that must not be listed whole.
+
+Cutting planes (Riedel, Improving the accuracy and efficiency of MAP inference for Markov logic, UAI 2008): solve
+without such a formula, ask which of its groundings the solution violates, add these, and solve again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.engines.choose import engine_for
+from mlnlite.engines.plan import Engine, Relation
+from mlnlite.ground.assemble import Piece
+from mlnlite.ground.compile import Source, bindings, with_number
+from mlnlite.ground.condition import condition
+from mlnlite.ground.ground import row_tables, source_of
+from mlnlite.ground.network import Network
+from mlnlite.ground.residual import ClauseShape
+from mlnlite.ground.tables import tables_of
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.facts import closed
+from mlnlite.model.formulas import AtomRef
+from mlnlite.model.propositional import cubes
+
+Int64 = NDArray[np.int64]
+
+
+def without_templates(network: Network, templates: Iterable[int]) -> Network:
+    """The network without the factors of some templates (indices in `model.templates`)."""
+    left_out = np.isin(network.template, list(templates))
+    clauses = tuple(
+        replace(c, literals=c.literals[k], weight=c.weight[k], count=c.count[k])
+        for c in network.clauses
+        for k in [~left_out[c.weight]]
+    )
+    tables = tuple(
+        replace(t, atoms=t.atoms[k], weight=t.weight[k], count=t.count[k])
+        for t in network.tables
+        for k in [~left_out[t.weight]]
+    )
+    return replace(network, clauses=clauses, tables=tables)
+
+
+def world_evidence(network: Network, truth: NDArray[np.bool_]) -> Evidence:
+    """A world of the network's atoms as evidence, everything else false."""
+    return closed(condition(network, truth.astype(np.int8)).evidence, network.evidence.predicates)
+
+
+def violations(
+    network: Network, world: Evidence, template: int, *, engine: Engine | None = None, most: int | None = None
+) -> list[Piece]:
+    """The groundings of a template that a world makes false, as clauses of atom numbers.
+
+    Args:
+        network: whose model has the template.
+        world: complete, as `world_evidence` gives it.
+        template: its index in `model.templates`.
+        engine: what runs the query.
+        most: no more than so many of each kind of clause.
+
+    Returns:
+        Pieces of clauses (the disjunction of literals that are all false in the world), over known atoms too.
+    """
+    tables = {**tables_of(world), **row_tables(network.model)}
+    source = source_of(template, network.model.templates[template], world)
+    run = (engine or engine_for(tables)).load(tables)
+    pieces = []
+    for cube in cubes(source.formula.body, False):
+        literals = [(p.index, truth) for p, truth in cube.items() if isinstance(p, AtomRef)]
+        plan = bindings(source, cube, source.formula.free)
+        for index, _ in literals:
+            plan = with_number(plan, world, source.formula.atoms[index], column_of(index))
+        rows = run(plan)
+        pieces += _pieces(source, literals, rows, most)
+    return pieces
+
+
+def column_of(index: int) -> str:
+    """Name of the column with the number of atom `index`."""
+    return f"n{index}"
+
+
+def _pieces(source: Source, literals: Sequence[tuple[int, bool]], rows: Relation, most: int | None) -> list[Piece]:
+    names = [column_of(i) for i, _ in literals]
+    n_rows = len(rows[names[0]]) if names else 0
+    if not n_rows:
+        return []
+    keep = np.arange(n_rows)[:most]
+    # every literal of the cube holds, so the clause of their negations is what is violated
+    shape = ClauseShape(tuple(i for i, _ in literals), tuple(not truth for _, truth in literals), negated=False)
+    row = rows["row"][keep] if source.tabled else np.zeros(len(keep), np.int64)
+    return [Piece(tuple(rows[name][keep] for name in names), shape, row, np.ones(len(keep), np.int64))]
