@@ -35,10 +35,6 @@ if TYPE_CHECKING:
     from mlnlite.domains.handover.objects import HandoverObject as HandoverObject
     from mlnlite.domains.handover.objects import object_names as object_names
     from mlnlite.domains.handover.objects import read_object as read_object
-    from mlnlite.domains.handover.optimise import Configuration as Configuration
-    from mlnlite.domains.handover.optimise import Handover as Handover
-    from mlnlite.domains.handover.optimise import optimise as optimise
-    from mlnlite.domains.handover.optimise import require as require
     from mlnlite.domains.handover.pose import Pose as Pose
     from mlnlite.domains.handover.receiver import Body as Body
     from mlnlite.domains.handover.receiver import Receiver as Receiver
@@ -49,6 +45,10 @@ if TYPE_CHECKING:
     from mlnlite.domains.handover.scene import Layout as Layout
     from mlnlite.domains.handover.scene import Scene as Scene
     from mlnlite.domains.handover.scene import make_scene as make_scene
+    from mlnlite.domains.handover.search import Configuration as Configuration
+    from mlnlite.domains.handover.search import Handover as Handover
+    from mlnlite.domains.handover.search import optimise as optimise
+    from mlnlite.domains.handover.search import require as require
 
 _HOMES = {
     "checks": "Check five_checks violations",
@@ -60,7 +60,7 @@ _HOMES = {
     "methods": "hand_over",
     "mobility": "MobilityLevel read_levels",
     "objects": "HandoverObject object_names read_object",
-    "optimise": "Configuration Handover optimise require",
+    "search": "Configuration Handover optimise require",
     "pose": "Pose",
     "receiver": "Body Receiver read_receiver",
     "robots": "Gripper Robot read_robot",

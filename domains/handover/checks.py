@@ -18,10 +18,10 @@ from mlnlite.domains.handover.fields import Options, cost_points
 from mlnlite.domains.handover.grasps import CLEARANCE, GraspSet, in_gripper, sample_grasps
 from mlnlite.domains.handover.ik import Tolerance
 from mlnlite.domains.handover.objects import region_points
-from mlnlite.domains.handover.optimise import Configuration
 from mlnlite.domains.handover.plan import plan_path
 from mlnlite.domains.handover.pose import Pose, angle_between, compose, inverse, pose_from_matrix, transform_points
 from mlnlite.domains.handover.scene import Scene
+from mlnlite.domains.handover.search import Configuration
 
 CHECKS = ("stable", "plan", "reach", "affordance", "safe")
 """Stable grasp, plan exists, reachable by the human, affordance region left free, safe distances; in this order."""

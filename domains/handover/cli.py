@@ -13,9 +13,9 @@ import click
 from mlnlite.domains.handover import load
 
 if TYPE_CHECKING:
-    from mlnlite.domains.handover.optimise import Configuration, Handover
     from mlnlite.domains.handover.report import Row
     from mlnlite.domains.handover.scene import Scene
+    from mlnlite.domains.handover.search import Configuration, Handover
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +92,10 @@ def optimise(context: click.Context, **given: Any) -> None:  # noqa: ANN401 - cl
     scene = _scene(_Words(**keys))
     options = load("fields").Options(distance="surface" if given["surface"] else "point")
     if given["method"] == "ours":
-        result = load("optimise").optimise(scene, options, exhaustive=given["exhaustive"])
+        result = load("search").optimise(scene, options, exhaustive=given["exhaustive"])
     else:
         result = load("methods").hand_over(scene, given["method"], options)
-    found = load("optimise").require(result)
+    found = load("search").require(result)
     (_print_json if given["form"] == "json" else _print_text)(scene, result, found)
     if given["figure"]:
         figures = load("figures")

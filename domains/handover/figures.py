@@ -16,10 +16,10 @@ from mlnlite.domains.handover.chain import Chain, tool_poses
 from mlnlite.domains.handover.fields import CostField, Options, cost_field
 from mlnlite.domains.handover.grasps import sample_grasps
 from mlnlite.domains.handover.methods import METHODS
-from mlnlite.domains.handover.optimise import Configuration
 from mlnlite.domains.handover.pose import FloatArray, transform_points
 from mlnlite.domains.handover.report import PAPER, Row, common, pick
 from mlnlite.domains.handover.scene import Scene
+from mlnlite.domains.handover.search import Configuration
 
 COLOURS = {"A": "#b5483a", "B": "#d9a441", "ours": "#2f7f6f"}
 

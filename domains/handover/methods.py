@@ -18,10 +18,10 @@ from mlnlite.domains.handover.costs import distances, reachability, safety
 from mlnlite.domains.handover.feasibility import Hold, attempt, clear_turns, human_grasp
 from mlnlite.domains.handover.fields import Options, cost_points, presented_direction
 from mlnlite.domains.handover.grasps import GraspSet, sample_grasps
-from mlnlite.domains.handover.optimise import Configuration, Handover, optimise, rank_grasps
 from mlnlite.domains.handover.pose import FloatArray, Pose, locked, rotation_about
 from mlnlite.domains.handover.receiver import TRUNK
 from mlnlite.domains.handover.scene import Scene
+from mlnlite.domains.handover.search import Configuration, Handover, optimise, rank_grasps
 from mlnlite.domains.handover.tables import choose
 from mlnlite.domains.handover.voxels import UP, presenting_rotations
 

@@ -18,10 +18,10 @@ from mlnlite.domains.handover.figures import joint_origins
 from mlnlite.domains.handover.grasps import sample_grasps
 from mlnlite.domains.handover.methods import METHODS, hand_over
 from mlnlite.domains.handover.mobility import read_levels
-from mlnlite.domains.handover.optimise import Configuration, Handover
 from mlnlite.domains.handover.pose import FloatArray, Pose, transform_points
 from mlnlite.domains.handover.receiver import at_level
 from mlnlite.domains.handover.scene import Layout, Scene, make_scene
+from mlnlite.domains.handover.search import Configuration, Handover
 
 SKIN, STEEL, THING, REGION = (214, 190, 168), (68, 84, 106), (91, 143, 217), (47, 127, 111)
 """Colours of receiver, robot, object and the receiver's region."""
@@ -37,8 +37,8 @@ def open_view(scene: Scene, *, port: int = 8080, host: str = "127.0.0.1") -> vis
     """
     server = viser.ViserServer(host=host, port=port, verbose=False)
     server.scene.set_up_direction("+z")
-    server.initial_camera.position = (1.3, -2.2, 1.9)
-    server.initial_camera.look_at = (0.45, -0.1, 1.0)
+    server.initial_camera.position = (0.9, -1.35, 1.55)
+    server.initial_camera.look_at = (0.50, 0.0, 1.05)
     levels = [level.name for level in read_levels()]
     start = levels.index(scene.receiver.level.name) if scene.receiver.level.name in levels else 0
     marks = tuple((i, name) for i, name in enumerate(levels))
@@ -119,7 +119,7 @@ def _draw_found(server: viser.ViserServer, scene: Scene, found: Configuration) -
     server.scene.add_point_cloud("/region", region, REGION, point_size=0.006, **_at(found.thing))
     place = human_grasp(scene, found.thing)
     server.scene.add_line_segments(
-        "/reach", np.stack([scene.hand.position, place])[None], (230, 120, 40), line_width=3.0
+        "/reach", np.stack([scene.hand.position, place])[None], (230, 120, 40), thickness=3.0, thickness_units="screen"
     )
 
 

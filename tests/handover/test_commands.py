@@ -98,3 +98,9 @@ def test_a_missing_package_says_what_to_install(monkeypatch):
     monkeypatch.setattr(package, "import_module", absent)
     with pytest.raises(MissingPart, match="pip install"):
         package.load("robots")
+
+
+def test_public_names_survive_the_import_of_their_modules():
+    for home, names in package._HOMES.items():
+        package.load(home)
+        assert home not in names.split(), "a module would hide the name"

@@ -13,10 +13,10 @@ from mlnlite.domains.handover.geometry import is_hidden
 from mlnlite.domains.handover.grasps import FRICTION, sample_grasps
 from mlnlite.domains.handover.mobility import read_level, read_levels
 from mlnlite.domains.handover.objects import object_names, read_object, region_centre, region_of, region_points
-from mlnlite.domains.handover.optimise import optimise, require
 from mlnlite.domains.handover.receiver import Body, read_receiver
 from mlnlite.domains.handover.robots import Gripper, read_robot
 from mlnlite.domains.handover.scene import Layout, make_scene
+from mlnlite.domains.handover.search import optimise, require
 from mlnlite.domains.handover.voxels import VoxelMap
 
 KNOWN = {"shoe", "stapler", "camera", "bowl", "plate", "sunglasses", "toothbrush", "marker", "flashlight", "glass",

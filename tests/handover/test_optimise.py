@@ -16,10 +16,10 @@ from mlnlite.domains.handover.costs import Limits
 from mlnlite.domains.handover.fields import Options
 from mlnlite.domains.handover.methods import METHODS, hand_over
 from mlnlite.domains.handover.objects import object_names, read_object
-from mlnlite.domains.handover.optimise import optimise, require
 from mlnlite.domains.handover.pose import pose_at
 from mlnlite.domains.handover.receiver import Body, read_receiver
 from mlnlite.domains.handover.scene import Layout, make_scene
+from mlnlite.domains.handover.search import optimise, require
 
 LEVELS = ("H", "H-M", "L-M", "L")
 SMALL = Options(orientations=4, grasps=2, ik_calls=10**6)
