@@ -17,6 +17,7 @@ from mlnlite.model.facts import closed
 from mlnlite.model.model import Model
 from mlnlite.model.read import one_database
 from mlnlite.model.symbols import Predicate
+from mlnlite.results import Marginals
 
 Float = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -121,16 +122,37 @@ def evaluate(
     others = set(evidence.predicates) - set(targets)
     evidence = closed(evidence, _closable(evidence, others) if closed_world == "all" else closed_world)
     explicit = {name for name in targets if not evidence.facts[name].truth.all()}
+    model = _without_zeros(model, evidence)
     outcomes: dict[str, list[_Outcomes]] = {name: [] for name in targets}
-    n_databases = 0
-    for i in np.unique(np.concatenate([evidence.facts[name].database for name in targets])).tolist():
-        n_databases += 1
+    answers: dict[bytes, Marginals] = {}
+    labelled = np.unique(np.concatenate([evidence.facts[name].database for name in targets])).tolist()
+    for i in labelled:
         one = one_database(evidence, i)
-        answer = marginal(model, _without(one, targets), targets)
+        hidden = _without(one, targets)
+        key = _content(hidden)
+        if key not in answers:
+            answers[key] = marginal(model, hidden, targets)
         for name in targets:
             if len(one.facts[name].truth):
-                outcomes[name].append(_outcomes(one, name, answer, explicit=name in explicit))
-    return Evaluation(tuple(_score(evidence.predicates[name], outcomes[name]) for name in targets), n_databases)
+                outcomes[name].append(_outcomes(one, name, answers[key], explicit=name in explicit))
+    return Evaluation(tuple(_score(evidence.predicates[name], outcomes[name]) for name in targets), len(labelled))
+
+
+def _without_zeros(model: Model, evidence: Evidence) -> Model:
+    """The model without formulas of weight 0, which change no probability; in a learnt template most do."""
+    kept = []
+    for template in (t.expanded(evidence.types) for t in model.templates):
+        assert template.rows is not None
+        rows = np.flatnonzero(template.weights != 0)
+        if len(rows):
+            kept.append(replace(template, rows=template.rows[rows], weights=template.weights[rows], row_spans=()))
+    return replace(model, templates=tuple(kept))
+
+
+def _content(evidence: Evidence) -> bytes:
+    """What is known, as bytes: databases that say the same have the same answer."""
+    facts = (array for f in evidence.facts.values() for array in (np.array(len(f.truth)), f.arguments, f.truth))
+    return b"".join(array.tobytes() for array in (*facts, *evidence.present.values()))
 
 
 def _targets(evidence: Evidence, predicates: Iterable[str]) -> list[str]:
