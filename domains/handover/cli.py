@@ -85,7 +85,7 @@ def handover() -> None:
 @click.option("--view", is_flag=True, help="Show the scene in the browser until interrupted.")
 @click.option("--port", default=8080, show_default=True, help="Of the browser view.")
 @click.pass_context
-def optimise(context: click.Context, **given: Any) -> None:  # noqa: ANN401 - click passes every option by name
+def optimise(context: click.Context, /, **given: Any) -> None:  # noqa: ANN401 - click passes every option by name
     """Find where to hold the object and how."""
     keys = {name: given.pop(name) for name in _Words.__slots__}
     context.meta["mlnlite.format"] = given["form"]

@@ -99,19 +99,19 @@ def attempt(scene: Scene, grasps: GraspSet, grasp: int, pose: Pose, options: Opt
             return Attempt(None, 0, "collision")
     if options.receiver and not can_reach(scene.receiver, human_grasp(scene, pose)):
         return Attempt(None, 0, "receiver")
-    return _solve(scene, grasps, grasp, tools, options.collisions)
+    return _solve(scene, grasps, grasp, tools, options)
 
 
-def _solve(scene: Scene, grasps: GraspSet, grasp: int, tools: list[tuple[int, Pose]], collisions: bool) -> Attempt:
-    solver, refused, calls = default_solver(scene.robot.chain), 0, 0
+def _solve(scene: Scene, grasps: GraspSet, grasp: int, tools: list[tuple[int, Pose]], options: Options) -> Attempt:
+    solver, refused, calls = options.solver or default_solver(scene.robot.chain), 0, 0
     to_base = inverse(scene.base, "base")
     for approach, tool in tools:
         in_base = compose(to_base, tool)
-        if collisions and not hand_is_free(scene.world, in_base):
+        if options.collisions and not hand_is_free(scene.world, in_base):
             refused += 1
             continue
         in_object = Pose(grasps.centres[grasp], grasps.rotations[grasp, approach], "object")
-        found = solver(in_base.matrix, _accept(scene, in_object) if collisions else None)
+        found = solver(in_base.matrix, _accept(scene, in_object) if options.collisions else None)
         calls, refused = calls + 1, refused + found.refused
         if found.found:
             return Attempt(Hold(approach, tool, found.q), calls)

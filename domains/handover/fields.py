@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mlnlite.domains.handover.chain import reach_bound
 from mlnlite.domains.handover.costs import Distance, Distances, Limits, Points, distances, reachability, safety
 from mlnlite.domains.handover.grasps import GraspSet
+from mlnlite.domains.handover.ik import IkSolver
 from mlnlite.domains.handover.objects import HandoverObject, region_centre, region_points
 from mlnlite.domains.handover.pose import FloatArray
 from mlnlite.domains.handover.scene import Scene
@@ -28,6 +29,7 @@ class Options:
         approaches: how many approach directions of a grasp to try per pose, best aligned with the arm first.
         collisions: whether robot, body and object must stay apart.
         receiver: whether the receiver's arm must reach the object at its level of mobility.
+        solver: inverse kinematics of the robot; by default damped least squares with seed 0.
         ik_calls: after so many calls of the inverse kinematics the search stops with a bound.
     """
 
@@ -38,6 +40,7 @@ class Options:
     approaches: int = 4
     collisions: bool = True
     receiver: bool = True
+    solver: IkSolver | None = None
     ik_calls: int = 4000
 
 

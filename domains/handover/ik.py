@@ -91,8 +91,7 @@ class DampedLeastSquares:
         target = np.ascontiguousarray(target[:3], dtype=np.float64)
         if not self.position_only and not _within_reach(self.chain, target):
             return IkSolution(self.table[0], False, 0)
-        _, order = self.tree.query(_features(target[None], self.position_only)[0], k=self.starts)
-        starts, spent, refused = self.table[order], 0, 0
+        starts, spent, refused = self.nearest(target, self.starts), 0, 0
         settings = self._settings()
         while len(starts) and refused < self.solutions:
             q, index, steps = solve(self.chain.table, target, starts, settings)
@@ -103,6 +102,11 @@ class DampedLeastSquares:
                 return IkSolution(locked(q), True, spent, refused)
             starts, refused = starts[index + 1 :], refused + 1
         return IkSolution(locked(q), False, spent, refused)
+
+    def nearest(self, target: FloatArray, n: int) -> FloatArray:
+        """The n tabulated configurations, shape (n, joints), with the poses nearest to a target, shape (4, 4) [m]."""
+        _, order = self.tree.query(_features(target[None, :3], self.position_only)[0], k=[*range(1, n + 1)])
+        return self.table[order]
 
     def _settings(self) -> FloatArray:
         weight = 0.0 if self.position_only else 0.3

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import TypedDict
 
 import matplotlib as mpl
 import numpy as np
+import pinocchio as pin
 import trimesh
 import viser
 
@@ -146,10 +148,17 @@ def _add_segment(
         return
     mesh = trimesh.creation.capsule(height=length, radius=radius, count=[12, 12])
     mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
-    mesh.apply_transform(trimesh.geometry.align_vectors([0, 0, 1], (ends[1] - ends[0]) / length))
+    turn = np.eye(4)
+    turn[:3, :3] = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), ends[1] - ends[0]).matrix()
+    mesh.apply_transform(turn)
     middle = tuple(0.5 * (ends[0] + ends[1]))
     server.scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, position=middle)
 
 
-def _at(pose: Pose) -> dict[str, FloatArray]:
-    return {"wxyz": pose.quaternion, "position": pose.position}
+class _Place(TypedDict):
+    wxyz: FloatArray
+    position: FloatArray
+
+
+def _at(pose: Pose) -> _Place:
+    return _Place(wxyz=pose.quaternion, position=pose.position)

@@ -170,3 +170,20 @@ def test_a_refused_solution_leads_to_another():
     assert other.found
     assert other.refused >= 1
     assert np.abs(other.q - first.q).max() > 0.05
+
+
+def test_pink_reaches_the_same_poses_another_way():
+    pytest.importorskip("pink")
+    from mlnlite.domains.handover.ik_pink import pink_solver
+
+    robot = read_robot("pr2")
+    solver = pink_solver(robot)
+    draw = np.random.default_rng(8).uniform(robot.chain.lower, robot.chain.upper, (40, 7))
+    found = [solver(target) for target in tool_poses(robot.chain, draw)]
+    assert sum(f.found for f in found) >= 38
+    for solution, target in zip(found, tool_poses(robot.chain, draw), strict=True):
+        if solution.found:
+            reached = _pinocchio(robot, solution.q)
+            assert np.linalg.norm(reached[:3, 3] - target[:3, 3]) <= 1e-3
+            assert (robot.chain.lower - 1e-9 <= solution.q).all()
+            assert (solution.q <= robot.chain.upper + 1e-9).all()

@@ -95,6 +95,17 @@ def test_full_maps_have_proven_and_sound_answers(name, robot):
     assert touching(scene.world, found.hold.q) == ()
 
 
+def test_another_solver_can_be_plugged_in():
+    pytest.importorskip("pink")
+    from mlnlite.domains.handover.ik_pink import pink_solver
+
+    scene = make_scene("marker", "to_write", "L-M")
+    options = Options(solver=pink_solver(scene.robot))
+    found = require(optimise(scene, options))
+    assert violations(scene, found, options) == ()
+    assert found.reach == pytest.approx(require(optimise(scene)).reach, abs=0.02)
+
+
 SCRIPT = """
 from mlnlite.domains.handover import make_scene, hand_over
 for robot in ("pr2", "panda"):
