@@ -86,10 +86,27 @@ def prepared(model: Model, evidence: Evidence) -> tuple[Model, Evidence, Tables]
     if evidence.n_databases != 1:
         hint = "choose one of them: `one_database(evidence, 0)`, or `--database 1` on the command line"
         raise QueryMistake(f"the evidence has {evidence.n_databases} databases, and a question is about one", hint)
+    verify_same_vocabulary(model, evidence)
     _verify_weights(model)
     evidence = completed(evidence)
     model = replace(model, templates=tuple(t.expanded(evidence.types) for t in model.templates))
     return model, evidence, {**tables_of(evidence), **row_tables(model)}
+
+
+def verify_same_vocabulary(model: Model, evidence: Evidence) -> None:
+    """Refuses evidence that was read for another model: its numbers would mean other constants.
+
+    Raises:
+        QueryMistake: naming the first type or predicate that differs.
+    """
+    hint = "read the evidence with this model: `read_evidence(path, model=model)`"
+    for name, t in model.types.items():
+        known = evidence.types[name].constants if name in evidence.types else ()
+        if known[: len(t.constants)] != t.constants:
+            raise QueryMistake(f"the evidence was read for another model: the constants of {name} differ", hint)
+    for name, predicate in model.predicates.items():
+        if name not in evidence.predicates or evidence.predicates[name].types != predicate.types:
+            raise QueryMistake(f"the evidence was read for another model: the predicate {name} differs", hint)
 
 
 def _verify_weights(model: Model) -> None:
