@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mlnlite.domains.handover.effort import Effort as Effort
     from mlnlite.domains.handover.effort import effort_at as effort_at
     from mlnlite.domains.handover.effort import effort_of as effort_of
+    from mlnlite.domains.handover.effort import reachable_set as reachable_set
     from mlnlite.domains.handover.fields import Options as Options
     from mlnlite.domains.handover.fields import cost_field as cost_field
     from mlnlite.domains.handover.grasps import sample_grasps as sample_grasps
@@ -53,7 +54,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "checks": "Check five_checks violations",
     "costs": "Limits appropriateness reachability safety",
-    "effort": "Effort effort_at effort_of",
+    "effort": "Effort effort_at effort_of reachable_set",
     "fields": "Options cost_field",
     "grasps": "sample_grasps",
     "ik": "damped_least_squares",

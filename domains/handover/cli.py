@@ -13,6 +13,7 @@ import click
 from mlnlite.domains.handover import load
 
 if TYPE_CHECKING:
+    from mlnlite.domains.handover.fields import Options
     from mlnlite.domains.handover.report import Row
     from mlnlite.domains.handover.scene import Scene
     from mlnlite.domains.handover.search import Configuration, Handover
@@ -82,6 +83,7 @@ def handover() -> None:
 @click.option("--exhaustive", is_flag=True, help="Ask about every voxel; same answer, slower.")
 @click.option("--format", "form", type=click.Choice(["text", "json"]), default="text", show_default=True)
 @click.option("--figure", type=click.Path(dir_okay=False), help="Write cost slices and a side view to an image.")
+@click.option("--field", type=click.Path(dir_okay=False), help="Write the reach cost in 3-D to an image.")
 @click.option("--view", is_flag=True, help="Show the scene in the browser until interrupted.")
 @click.option("--port", default=8080, show_default=True, help="Of the browser view.")
 @click.pass_context
@@ -97,11 +99,18 @@ def optimise(context: click.Context, /, **given: Any) -> None:  # noqa: ANN401 -
         result = load("methods").hand_over(scene, given["method"], options)
     found = load("search").require(result)
     (_print_json if given["form"] == "json" else _print_text)(scene, result, found)
-    if given["figure"]:
-        figures = load("figures")
-        figures.save(figures.draw_configuration(scene, found, options), given["figure"])
+    _save_pictures(scene, found, options, given["figure"], given["field"])
     if given["view"]:
         load("viewer").serve(scene, port=given["port"])
+
+
+def _save_pictures(scene: Scene, found: Configuration, options: Options, figure: str | None, field: str | None) -> None:
+    if figure:
+        figures = load("figures")
+        figures.save(figures.draw_configuration(scene, found, options), figure)
+    if field:
+        figures, grasps = load("figures"), load("grasps").sample_grasps(scene.thing, scene.robot.gripper)
+        figures.save(figures.draw_field(load("fields").cost_field(scene, grasps, found.grasp, options)), field)
 
 
 def _print_text(scene: Scene, result: Handover, found: Configuration) -> None:

@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 from scipy.optimize import NonlinearConstraint, minimize
 
 from mlnlite.domains.handover.ik import DampedLeastSquares, IkSolution, Tolerance, damped_least_squares
@@ -90,6 +91,11 @@ def easiest_posture(receiver: Receiver, place: FloatArray, load: float = 0.0) ->
 def can_reach(receiver: Receiver, place: FloatArray) -> bool:
     """Whether some posture within the level's ranges of motion brings the palm to `place`, shape (3,) [m], to 1 mm."""
     return _reach(receiver, place).found
+
+
+def reachable_set(receiver: Receiver, places: FloatArray) -> NDArray[np.bool_]:
+    """Which places, shape (n, 3) [m], the palm can be brought to; shape (n,). About 0.1 ms each."""
+    return np.array([can_reach(receiver, place) for place in places], dtype=np.bool_)
 
 
 def _reach(receiver: Receiver, place: FloatArray) -> IkSolution:

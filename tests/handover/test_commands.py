@@ -75,9 +75,12 @@ def test_effort_and_compare_write_their_pages(tmp_path):
 
 
 def test_a_figure_is_written(tmp_path):
-    found = _run("optimise", "--object", "shoe", "--figure", str(tmp_path / "shoe.png"))
+    found = _run(
+        "optimise", "--object", "shoe", "--figure", str(tmp_path / "shoe.png"), "--field", str(tmp_path / "3d.png")
+    )
     assert found.exit_code == 0, found.output
     assert (tmp_path / "shoe.png").stat().st_size > 10_000
+    assert (tmp_path / "3d.png").stat().st_size > 10_000
 
 
 def test_the_package_is_light_and_names_what_it_offers():

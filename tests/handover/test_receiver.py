@@ -9,11 +9,11 @@ pin = pytest.importorskip("pinocchio")
 
 from mlnlite.domains.handover.effort import (  # noqa: E402
     GRAVITY,
-    can_reach,
     easiest_posture,
     effort_at,
     effort_of,
     holding_torque,
+    reachable_set,
 )
 from mlnlite.domains.handover.mobility import read_levels  # noqa: E402
 from mlnlite.domains.handover.receiver import Body, frame_pose, read_receiver  # noqa: E402
@@ -113,7 +113,7 @@ def test_levels_nest():
 
 def test_reachable_places_shrink_with_the_level():
     grid = np.array([[x, y, z] for x in (0.3, 0.5, 0.7) for y in (-0.5, -0.2, 0.1) for z in (0.8, 1.0, 1.2, 1.5)])
-    counts = [sum(can_reach(read_receiver(level), place) for place in grid) for level in LEVELS]
+    counts = [int(reachable_set(read_receiver(level), grid).sum()) for level in LEVELS]
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] < counts[0]
 
