@@ -54,7 +54,7 @@ def test_command(name, benchmark, tmp_path):
         pytest.skip("the real data are not here")
     (tmp_path / "cup.db").write_text(CUP)
     command = [sys.executable, "-m", "mlnlite", *(str(a.resolve()) if isinstance(a, Path) else a for a in CASES[name])]
-    peaks = []
+    peaks, cpu = [], []
 
     def run():
         process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL)
@@ -62,7 +62,8 @@ def test_command(name, benchmark, tmp_path):
         process.returncode = os.waitstatus_to_exitcode(status)
         assert process.returncode == 0
         peaks.append(usage.ru_maxrss / 1024)
+        cpu.append(usage.ru_utime + usage.ru_stime)
 
     benchmark.pedantic(run, rounds=5, warmup_rounds=1)
-    benchmark.extra_info["peak MB"] = round(max(peaks))
+    benchmark.extra_info |= {"peak MB": round(max(peaks)), "CPU s": round(min(cpu), 2)}
     assert max(peaks) < 1024
