@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from mlnlite.ground.network import Network as Network
     from mlnlite.infer.answer import map_state as map_state
     from mlnlite.infer.answer import marginal as marginal
+    from mlnlite.infer.scored import Score as Score
+    from mlnlite.infer.scored import score as score
     from mlnlite.infer.session import Session as Session
     from mlnlite.infer.session import compile as compile
     from mlnlite.learn.evaluate import Evaluation as Evaluation
@@ -56,6 +58,8 @@ _HOMES = {
     "Network": "mlnlite.ground.network",
     "map_state": "mlnlite.infer.answer",
     "marginal": "mlnlite.infer.answer",
+    "Score": "mlnlite.infer.scored",
+    "score": "mlnlite.infer.scored",
     "Session": "mlnlite.infer.session",
     "compile": "mlnlite.infer.session",
     "Evaluation": "mlnlite.learn.evaluate",

@@ -17,6 +17,8 @@ COMMANDS = {
     "check": "Say what a model and its evidence are, and what is wrong with them.",
     "learn": "Learn the weights of a model from databases.",
     "query": "Ask a model: probabilities, or the most probable world.",
+    "ground": "Ground a model: what evidence leaves open, or what that would take; export it.",
+    "score": "Score a world: its log-weight and what it pays, formula by formula.",
     "evaluate": "Measure how well a model predicts what databases already say.",
 }
 """The built-in commands with a line each; `mlnlite.cli.NAME` is imported when NAME is asked for."""

@@ -206,7 +206,7 @@ def _binding_text(source: Source, binding: dict[int, int]) -> str:
 
 def _constant(source: Source, template: Template, *, truth: bool) -> Part:
     """A formula that is always true, or never."""
-    every = np.full(source.n_rows, _groundings_of_a_row(source), np.int64)
+    every = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
     none = np.zeros_like(every)
     if template.hard and not truth:
         raise _violated(template, "")
@@ -232,7 +232,7 @@ def _part(source: Source, plan: Compiled, rows: Relation, groups: list[Group], *
     n_rows = len(next(iter(rows.values()))) if rows else 1
     row = rows["row"] if source.tabled else np.zeros(n_rows, np.int64)
     count = rows["count"] if plan.counted else np.ones(n_rows, np.int64)
-    total = np.full(source.n_rows, _groundings_of_a_row(source), np.int64)
+    total = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
     listed = {True: np.zeros(source.n_rows, np.int64), False: np.zeros(source.n_rows, np.int64)}
     open_ = np.zeros(source.n_rows, np.int64)
     pieces = []
@@ -251,7 +251,7 @@ def _part(source: Source, plan: Compiled, rows: Relation, groups: list[Group], *
     return Part(tuple(pieces), decided_true, decided_false)
 
 
-def _groundings_of_a_row(source: Source) -> int:
+def groundings_of_a_row(source: Source) -> int:
     """Number of bindings of the free variables that are not keys."""
     sizes = [
         int(source.evidence.present[source.formula.variables[v].type].sum())

@@ -1,0 +1,41 @@
+"""True groundings of every formula in one world, by counting joins: no network, no grounding listed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.engines.numpy import NumpyEngine
+from mlnlite.engines.plan import Count, Engine
+from mlnlite.ground.compile import bindings
+from mlnlite.ground.ground import groundings_of_a_row, row_tables, source_of
+from mlnlite.ground.tables import tables_of
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.facts import closed
+from mlnlite.model.model import Model
+from mlnlite.model.propositional import cubes
+
+Int64 = NDArray[np.int64]
+
+
+def count_true(model: Model, world: Evidence, *, engine: Engine | None = None) -> Int64:
+    """Number of true groundings of each weight (the rows of all templates, one after the other).
+
+    Args:
+        model: with expanded templates.
+        world: one database; what is not a fact is false.
+        engine: what runs the joins; by default the reference engine.
+    """
+    world = closed(world, world.predicates)
+    run = (engine or NumpyEngine()).load({**tables_of(world), **row_tables(model)})
+    found = [np.empty(0, np.int64)]
+    for i, template in enumerate(model.templates):
+        source = source_of(i, template, world)
+        false, true = cubes(source.formula.body, False), cubes(source.formula.body, True)
+        chosen = true if len(true) < len(false) else false
+        n = np.zeros(source.n_rows, np.int64)
+        for cube in chosen:
+            rows = run(Count(bindings(source, cube, source.formula.free), ("row",) if source.tabled else ()))
+            np.add.at(n, rows["row"] if source.tabled else np.zeros(len(rows["count"]), np.int64), rows["count"])
+        found.append(n if chosen is true else groundings_of_a_row(source) - n)
+    return np.concatenate(found)
