@@ -88,7 +88,7 @@ def learn(**options: Unpack[_Options]) -> None:
         click.echo(json.dumps({**learned.to_dict(), **where}, indent=2))
         return
     click.echo(str(learned), err=output is None)
-    click.echo(text if output is None else f"{'written to':<26}{output}", nl=output is not None)
+    click.echo(text if output is None else f"{'written to':<36}{output}", nl=output is not None)
 
 
 def _inputs(options: _Options) -> _Inputs:
@@ -112,7 +112,7 @@ def _learned(inputs: _Inputs, options: _Options) -> LearnedModel:
     predict = names(options["predict"]) or None
     with working("learning"):
         return ml.learn(
-            model, databases, prior_sd=_prior_sd(options), predict=predict, time_limit=options["time_limit"]
+            model, databases, prior=_prior_sd(options), predict=predict, time_limit=options["time_limit"]
         )
 
 
@@ -134,11 +134,12 @@ def learned_text(learned: LearnedModel) -> str:
 
 def _header(learned: LearnedModel, inputs: _Inputs) -> str:
     """How the weights came about, as comments."""
-    prior = "none" if learned.prior_sd is None else f"Gaussian, mean 0, standard deviation {learned.prior_sd:g}"
+    from mlnlite.learn.prior import prior_text
+
     lines = [
         f"learnt by mlnlite {__version__}",
         f"{learned.objective} {learned.value:.6f}",
-        f"prior: {prior}",
+        f"prior: {prior_text(learned.prior)}",
         f"stopped: {learned.status} after {learned.iterations} steps",
         *(f"model: {_named(path)}" for path in inputs.models),
         *(f"data: {_named(path)}" for path in inputs.databases),

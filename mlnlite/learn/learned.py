@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mlnlite.learn.prior import Penalty, Prior, prior_data, prior_text
+from mlnlite.learn.problem import Problem
 from mlnlite.model.model import Model
 
 
@@ -20,7 +22,7 @@ class LearnedModel:
         model: the model; its templates have one row for each weight.
         objective: what was maximised.
         value: the objective at the weights, without the prior.
-        prior_sd: standard deviation of the Gaussian prior with mean 0; None without prior.
+        prior: what was believed of the weights before; None for nothing.
         bound: no weight is larger than this in size.
         unbounded: shape (n_weights,), without a prior the best weight is plus (1) or minus (-1) infinity; else 0.
         unsupported: shape (n_weights,), no atom's probability depends on the weight; it stays 0.
@@ -29,12 +31,15 @@ class LearnedModel:
         gradient: largest entry of the gradient of the objective and prior at the weights.
         iterations: steps of the search.
         seconds: time spent by stage.
+        history: objective and log prior at the start and after each step.
+        problem: what was solved, for what is asked of the weights afterwards.
+        penalty: of each weight, with what was learnt of the prior put in.
     """
 
     model: Model
     objective: str
     value: float
-    prior_sd: float | None
+    prior: Prior | None
     bound: float
     unbounded: NDArray[np.int8] = field(repr=False)
     unsupported: NDArray[np.bool_] = field(repr=False)
@@ -43,6 +48,9 @@ class LearnedModel:
     gradient: float
     iterations: int
     seconds: Mapping[str, float]
+    history: tuple[float, ...] = field(repr=False)
+    problem: Problem = field(repr=False, compare=False)
+    penalty: Penalty = field(repr=False, compare=False)
 
     @property
     def weights(self) -> NDArray[np.float64]:
@@ -54,7 +62,7 @@ class LearnedModel:
         return {
             "objective": self.objective,
             "value": self.value,
-            "prior": None if self.prior_sd is None else {"family": "gaussian", "mean": 0.0, "sd": self.prior_sd},
+            "prior": prior_data(self.prior),
             "bound": self.bound,
             "n_weights": len(self.unbounded),
             "n_finite": self.n_finite,
@@ -81,21 +89,20 @@ class LearnedModel:
 
     def __str__(self) -> str:
         """A summary for a terminal."""
-        prior = "none" if self.prior_sd is None else f"Gaussian, mean 0, standard deviation {self.prior_sd:g}"
         n_unbounded = int(np.count_nonzero(self.unbounded))
         lines = [
-            f"{self.objective:<26}{self.value:.6f}  ({self.n_choices:,} atoms and blocks predicted from the rest)",
-            f"{'prior':<26}{prior}",
-            f"{'weights':<26}{len(self.unbounded):,}",
-            f"{'  finite':<26}{self.n_finite:,}",
-            f"{'  zero':<26}{int(self.unsupported.sum()):,}  (not supported by any data)",
-            f"{'  unbounded without prior':<26}{n_unbounded:,}" + self._clipped(n_unbounded),
-            f"{'stopped':<26}{self.status} after {self.iterations} steps, largest gradient entry {self.gradient:.1e}",
+            f"{self.objective:<36}{self.value:.6f}  ({self.n_choices:,} atoms and blocks predicted from the rest)",
+            f"{'prior':<36}{prior_text(self.prior)}",
+            f"{'weights':<36}{len(self.unbounded):,}",
+            f"{'  finite':<36}{self.n_finite:,}",
+            f"{'  zero':<36}{int(self.unsupported.sum()):,}  (not supported by any data)",
+            f"{'  unbounded without prior':<36}{n_unbounded:,}" + self._clipped(n_unbounded),
+            f"{'stopped':<36}{self.status} after {self.iterations} steps, largest gradient entry {self.gradient:.1e}",
         ]
         return "\n".join(lines)
 
     def _clipped(self, n_unbounded: int) -> str:
-        if not n_unbounded or self.prior_sd is not None:
+        if not n_unbounded or self.prior is not None:
             return ""
         return f"  (clipped at +-{self.bound:g}: the data never contradict these formulas, or never support them)"
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,9 @@ from numpy.typing import NDArray
 from mlnlite.learn.merge import Choices
 
 Float = NDArray[np.float64]
+
+Operator: TypeAlias = Callable[[Float], Float]
+"""A matrix as its product with a vector."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
-"""Maximises a concave function within bounds: projected Newton, steps by conjugate gradients, backtracking.
+"""Maximises a concave function within bounds, less an L1 penalty: projected Newton, conjugate gradients, backtracking.
 
-Method: D. Bertsekas, Projected Newton methods for optimization problems with simple constraints, SIAM J. Control 1982;
-truncated conjugate gradients as in Nocedal and Wright, Numerical Optimization, 2006, chapter 7.
+Methods: D. Bertsekas, Projected Newton methods for optimization problems with simple constraints, SIAM J. Control 1982;
+truncated conjugate gradients as in Nocedal and Wright, Numerical Optimization, 2006, chapter 7; orthants for the L1
+penalty as in G. Andrew and J. Gao, Scalable training of L1-regularized log-linear models, ICML 2007.
 """
 
 from __future__ import annotations
@@ -35,10 +36,11 @@ class Optimum:
 
     Attributes:
         x: the point.
-        value: the function there.
+        value: the function there, L1 penalty included.
         gradient: its largest projected gradient entry.
         iterations: Newton steps.
         status: `converged`, `no further increase`, `iteration limit` or `time limit`.
+        history: the function at the start and after each step.
     """
 
     x: Float
@@ -46,6 +48,25 @@ class Optimum:
     gradient: float
     iterations: int
     status: str
+    history: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Problem:
+    """What is maximised, and where."""
+
+    function: Concave
+    l1: Float
+    bound: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Point:
+    """A point of the search; `slope` is the gradient, that of the better side where the L1 penalty has a kink."""
+
+    x: Float
+    value: float
+    slope: Float
 
 
 def maximise(
@@ -53,35 +74,65 @@ def maximise(
     start: Float,
     bound: float,
     *,
+    l1: Float | None = None,
     tolerance: float = 1e-8,
     iterations: int = 500,
     deadline: float | None = None,
 ) -> Optimum:
-    """The maximum of a concave function over `|x_i| <= bound`.
+    """The maximum of a concave function, less `l1 @ |x|`, over `|x_i| <= bound`.
 
     Args:
         function: what to maximise.
         start: first point, shape (n,).
         bound: of each coordinate.
+        l1: shape (n,), not negative.
         tolerance: of the largest projected gradient entry.
         iterations: most Newton steps.
         deadline: `time.monotonic()` at which to stop with the best point so far.
     """
-    x = np.clip(start, -bound, bound)
-    value, gradient = function.value(x)
-    for iteration in range(iterations):
-        free = ~((x >= bound) & (gradient > 0) | (x <= -bound) & (gradient < 0))
-        size = float(np.abs(gradient[free]).max(initial=0.0))
-        if size <= tolerance:
-            return Optimum(x, value, size, iteration, "converged")
-        if deadline is not None and monotonic() > deadline:
-            return Optimum(x, value, size, iteration, "time limit")
-        step = _newton_step(function, x, gradient, free)
-        moved = _line_search(function, x, value, gradient, np.where(free, step, 0.0), bound)
+    problem = _Problem(function, np.zeros(len(start)) if l1 is None else l1, bound)
+    point = _at(problem, np.clip(start, -bound, bound))
+    history = [point.value]
+    status = ""
+    while not status:
+        free = _free(problem, point)
+        size = float(np.abs(point.slope[free]).max(initial=0.0))
+        status = _why_stop(size <= tolerance, len(history) > iterations, deadline)
+        if status:
+            break
+        step = _newton_step(function, point.x, point.slope, free)
+        moved = _line_search(problem, point, np.where(free, step, 0.0))
         if moved is None:
-            return Optimum(x, value, size, iteration, "no further increase")
-        x, value, gradient = moved
-    return Optimum(x, value, size, iterations, "iteration limit")
+            status = "no further increase"
+        else:
+            point = moved
+            history.append(point.value)
+    return Optimum(point.x, point.value, size, len(history) - 1, status, tuple(history))
+
+
+def _why_stop(flat: bool, many: bool, deadline: float | None) -> str:
+    """Why to stop, empty to go on."""
+    if flat:
+        return "converged"
+    if deadline is not None and monotonic() > deadline:
+        return "time limit"
+    return "iteration limit" if many else ""
+
+
+def _at(problem: _Problem, x: Float) -> _Point:
+    value, gradient = problem.function.value(x)
+    l1 = problem.l1
+    at_kink = np.sign(gradient) * np.maximum(np.abs(gradient) - l1, 0.0)
+    slope = np.where(x == 0, at_kink, gradient - l1 * np.sign(x))
+    return _Point(x, value - float(l1 @ np.abs(x)), slope)
+
+
+def _free(problem: _Problem, point: _Point) -> NDArray[np.bool_]:
+    """Coordinates that may move: not held by a bound, and not by a kink."""
+    x, slope, bound = point.x, point.slope, problem.bound
+    held = (x >= bound) & (slope > 0) | (x <= -bound) & (slope < 0)
+    kink = (problem.l1 > 0) & (x == 0) & (slope == 0)
+    return np.asarray(~held & ~kink)
 
 
 def _newton_step(function: Concave, x: Float, gradient: Float, free: NDArray[np.bool_]) -> Float:
@@ -111,16 +162,20 @@ def _newton_step(function: Concave, x: Float, gradient: Float, free: NDArray[np.
     return step
 
 
-def _line_search(
-    function: Concave, x: Float, value: float, gradient: Float, step: Float, bound: float
-) -> tuple[Float, float, Float] | None:
-    """The first of step, step/2, step/4, ... that increases the function enough; None if none does."""
+def _line_search(problem: _Problem, point: _Point, step: Float) -> _Point | None:
+    """The first of step, step/2, step/4, ... that increases the function enough; None if none does.
+
+    With an L1 penalty no coordinate crosses zero: it stops there.
+    """
+    side = np.where(point.x != 0, np.sign(point.x), np.sign(point.slope))
+    low = np.where((problem.l1 > 0) & (side > 0), 0.0, -problem.bound)
+    high = np.where((problem.l1 > 0) & (side < 0), 0.0, problem.bound)
     length = 1.0
-    slack = 1e-12 * max(1.0, abs(value))
+    slack = 1e-12 * max(1.0, abs(point.value))
     for _ in range(50):
-        candidate = np.clip(x + length * step, -bound, bound)
-        new_value, new_gradient = function.value(candidate)
-        if new_value >= value + 1e-4 * float(gradient @ (candidate - x)) - slack:
-            return (candidate, new_value, new_gradient) if (candidate != x).any() else None
+        candidate = _at(problem, np.clip(point.x + length * step, low, high))
+        gain = float(point.slope @ (candidate.x - point.x))
+        if candidate.value >= point.value + 1e-4 * gain - slack:
+            return candidate if (candidate.x != point.x).any() else None
         length /= 2
     return None

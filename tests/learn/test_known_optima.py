@@ -33,7 +33,7 @@ def smokers():
     ],
 )
 def test_smokers(prior_sd, predict, expected):
-    learned = ml.learn(*smokers(), prior_sd=prior_sd, predict=predict)
+    learned = ml.learn(*smokers(), prior=prior_sd, predict=predict)
     assert learned.weights == pytest.approx(expected, abs=1e-5)
     assert learned.status == "converged"
 
@@ -73,7 +73,7 @@ def best(n_true, n_short, prior_sd):
 def test_authors_data_in_closed_form(prior_sd):
     model = handover_model()
     data = ml.read_evidence(folder("handover") / "dataset.db", model=model)
-    learned = ml.learn(model, data, prior_sd=prior_sd)
+    learned = ml.learn(model, data, prior=prior_sd)
     (template,) = learned.model.templates
     types = [data.types[template.formula.variables[k].type].constants for k in template.keys]
     names = [tuple(t[i] for t, i in zip(types, row, strict=True)) for row in template.rows.tolist()]
@@ -104,7 +104,7 @@ def votes(model, name):
 def test_voting_equals_logistic_regression(sd):
     model = ml.read_model(folder("mln", "voting") / "voting.mln")
     data, table = votes(model, "voting-train.db")
-    learned = ml.learn(model, data, predict=["Democrat"], prior_sd=sd)
+    learned = ml.learn(model, data, predict=["Democrat"], prior=sd)
     inputs = np.column_stack([np.ones(len(table)), table[:, 1:]])
     fit = LogisticRegression(C=sd**2, fit_intercept=False, tol=1e-10, max_iter=10_000).fit(inputs, table[:, 0])
     assert learned.weights == pytest.approx(fit.coef_[0], abs=1e-4)

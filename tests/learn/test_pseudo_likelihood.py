@@ -13,7 +13,8 @@ import mlnlite as ml
 from mlnlite.engines.duckdb import DuckDBEngine
 from mlnlite.engines.numpy import NumpyEngine
 from mlnlite.learn import likelihood
-from mlnlite.learn.weights import _choices
+from mlnlite.learn.merge import merged
+from mlnlite.learn.weights import pseudo_listed
 from tests import brute
 from tests.models import evidence_texts, model_texts
 
@@ -30,8 +31,8 @@ def choices_of(text, databases, engine=None):
     model = ml.model_from_text(text)
     evidence = ml.evidence_from_text("\n---\n".join(databases), model=model)
     expanded = replace(model, templates=tuple(t.expanded(evidence.types) for t in model.templates))
-    found = _choices(expanded, evidence, frozenset(model.predicates), engine or NumpyEngine())
-    return expanded, evidence, found
+    found = pseudo_listed(expanded, evidence, frozenset(model.predicates), engine or NumpyEngine())
+    return expanded, evidence, merged(found, sum(len(t.weights) for t in expanded.templates))
 
 
 @settings(max_examples=50, deadline=None)
@@ -61,18 +62,3 @@ def test_engines_agree(text, facts):
         model, _, found = choices_of(text, [facts], engine)
         values.append(likelihood.at(found, np.linspace(-1, 1, sum(len(t.weights) for t in model.templates))).value)
     assert values[0] == pytest.approx(values[1], abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("prior_sd", "expected"),
-    [(None, (0.646696, 1.519900)), (5.0, (0.628576, 1.508115)), (1.0, (0.380768, 1.291365))],
-)
-def test_smokers(prior_sd, expected):
-    folder = DATA / "pracmln" / "smokers"
-    if not folder.exists():
-        pytest.skip("needs the shared data")
-    model = ml.read_model(folder / "mlns" / "smoking.mln")
-    data = ml.read_evidence(folder / "dbs" / "smoking-train.db", model=model)
-    learned = ml.learn(model, data, prior_sd=prior_sd)
-    assert learned.weights == pytest.approx(expected, abs=1e-5)
-    assert learned.status == "converged"
