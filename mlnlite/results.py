@@ -22,6 +22,7 @@ Bool = NDArray[np.bool_]
 Int64 = NDArray[np.int64]
 
 _SHOWN = 60
+_PAID = 10
 
 
 class UnknownRowError(QueryMistake, KeyError):
@@ -186,6 +187,10 @@ class MapState(Mapping[str, bool]):
         violated: the soft formulas that the world pays for.
         statistics: what it took.
         block: shape (n,), number of the functional block of each atom, -1 for none.
+        cost: weight of the false groundings of formulas with positive weight, and of the true ones (without sign)
+            where it is negative; nan if nobody worked it out.
+        open_cost: the part of it on groundings that evidence leaves open.
+        gap: how much larger the log-weight of another world (or smaller its cost) could at most be.
     """
 
     names: tuple[str, ...]
@@ -197,16 +202,16 @@ class MapState(Mapping[str, bool]):
     violated: tuple[Violation, ...] = ()
     statistics: Statistics = Statistics()
     block: Int64 | None = None
+    cost: float = float("nan")
+    open_cost: float = float("nan")
+    gap: float = float("nan")
     _index: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Prepares look-up by text."""
         object.__setattr__(self, "_index", _index_of(self.names))
-
-    @property
-    def gap(self) -> float:
-        """How much larger the log-weight of another world could at most be."""
-        return self.bound - self.log_weight
+        if not isfinite(self.gap):
+            object.__setattr__(self, "gap", self.bound - self.log_weight)
 
     @property
     def state(self) -> dict[str, bool]:
@@ -240,12 +245,16 @@ class MapState(Mapping[str, bool]):
         Args:
             limit: show at most so many rows.
         """
-        worst = sorted(self.violated, key=lambda v: -v.cost)[: limit or None]
-        paid = [f"pays {v.cost:.4g} for {v.formula} ({v.n_groundings:,} x {v.weight:.4g})" for v in worst]
-        rest = len(self.violated) - len(worst)
-        paid += [f"pays for {rest:,} more formulas"] if rest else []
-        summary = f"status: {self.status}, log-weight {self.log_weight:.6f}, bound {self.bound:.6f}, gap {self.gap:.3g}"
-        return _text(("true atom", "method"), self._rows(), limit, [*paid, summary, str(self.statistics)])
+        worst = sorted(self.violated, key=lambda v: -v.cost)
+        paid = [f"pays {v.cost:.4g} for {v.formula} ({v.n_groundings:,} x {v.weight:.4g})" for v in worst[:_PAID]]
+        rest = worst[_PAID:]
+        paid += [f"pays {sum(v.cost for v in rest):.4g} for {len(rest):,} more formulas"] if rest else []
+        weight = f"log-weight {self.log_weight:.6f}, bound {self.bound:.6f}, gap {self.gap:.3g}"
+        summary = [f"status: {self.status}, {weight}"]
+        if isfinite(self.cost):
+            open_ = f"{self.open_cost:.6f} of it where evidence leaves a choice"
+            summary.insert(0, f"cost: {self.cost:.6f}, {open_}; no world costs less than {self.cost - self.gap:.6f}")
+        return _text(("true atom", "method"), self._rows(), limit, [*paid, *summary, str(self.statistics)])
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Cells of the table."""
@@ -264,6 +273,8 @@ class MapState(Mapping[str, bool]):
             "log_weight": _number(self.log_weight),
             "bound": _number(self.bound),
             "gap": _number(self.gap),
+            "cost": _number(self.cost),
+            "open_cost": _number(self.open_cost),
             "true_atoms": list(self.true_atoms),
             "state": self.state,
             "violated": paid,

@@ -15,10 +15,11 @@ from mlnlite.ground.ground import ground
 from mlnlite.ground.groups import renamed
 from mlnlite.ground.network import Network
 from mlnlite.infer.formula import formula_probabilities
-from mlnlite.infer.map import Method, map_of
+from mlnlite.infer.map import map_of
 from mlnlite.infer.marginal import WIDTH_LIMIT, marginals_of
 from mlnlite.infer.query import Question, atom_numbers, question_of
-from mlnlite.infer.score import counts
+from mlnlite.infer.rungs import Method
+from mlnlite.infer.score import costs, counts
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
 from mlnlite.model.formulas import AtomRef, Expression
@@ -104,6 +105,7 @@ def map_state(
     method: Method = "auto",
     time_limit: float | None = None,
     seed: int = 0,
+    gap: float = 0.0,
     engine: Engine | None = None,
 ) -> MapState:
     """A most probable world given evidence, with a bound that proves it or says how much better another could be.
@@ -113,9 +115,11 @@ def map_state(
         evidence: one database. What it does not say is unknown.
         query: which atoms to show (the world is most probable as a whole); None for all that are open.
         closed_world: as in `marginal`.
-        method: "auto", "ve" (elimination) or "wcsp" (toulbar2).
+        method: "auto" takes the cheapest that can; or "ve" (elimination), "mincut", "ilp" (HiGHS), "wcsp" (toulbar2),
+            "maxsat" (RC2), "annealing", "maxwalksat".
         time_limit: [s] for the search.
         seed: of the search.
+        gap: good enough is a world that costs at most this share more than the best one.
         engine: what runs the grounding plans; by default chosen by size.
 
     Raises:
@@ -125,8 +129,9 @@ def map_state(
     """
     asked = _ask(model, evidence, query, closed_world, engine)
     return map_state_for(
-        asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, ground_seconds=asked.seconds
-    )
+        asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, gap=gap,
+        ground_seconds=asked.seconds,
+    )  # fmt: skip
 
 
 def map_state_for(
@@ -136,6 +141,7 @@ def map_state_for(
     method: Method = "auto",
     time_limit: float | None = None,
     seed: int = 0,
+    gap: float = 0.0,
     ground_seconds: float = 0.0,
 ) -> MapState:
     """Answers a question about the most probable world of a network; see `map_state`."""
@@ -143,10 +149,11 @@ def map_state_for(
         hint = "ask for atoms or predicates; the probability of a formula is a question for `marginal`"
         raise QueryMistake(f"the most probable world has atoms, not formulas: {question.formulas[0].text}", hint)
     start = perf_counter()
-    best = map_of(network, method=method, time_limit=time_limit, seed=seed)
+    best = map_of(network, method=method, time_limit=time_limit, seed=seed, gap=gap)
     index, truth = _locate(network, question.atoms)
     truth[index >= 0] = best.truth[index[index >= 0]]
     methods = [best.component_method[best.component[i]] if i >= 0 else EVIDENCE for i in index.tolist()]
+    total, open_ = costs(network, best.truth)
     seconds = {"ground": ground_seconds, "infer": perf_counter() - start}
     return MapState(
         names=tuple(_texts(network.evidence, question.atoms)),
@@ -155,6 +162,9 @@ def map_state_for(
         log_weight=best.log_weight,
         bound=best.bound,
         status=best.status,
+        cost=float(total.sum()),
+        open_cost=float(open_.sum()),
+        gap=best.gap,
         violated=tuple(_violations(network, best.truth)),
         statistics=Statistics(
             network.n_atoms, network.n_factors, len(best.component_status), best.largest_table, seconds

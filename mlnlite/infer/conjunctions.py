@@ -49,7 +49,9 @@ class Cells:
     amount: Float
 
 
-def split_wide(rows: Conjunctions, cardinality: Int32) -> tuple[list[Conjunctions], Int32]:
+def split_wide(
+    rows: Conjunctions, cardinality: Int32, max_arity: float = MAX_ARITY
+) -> tuple[list[Conjunctions], Int32]:
     """Replaces conjunctions too wide for a table by chains of auxiliary variables.
 
     Auxiliary variable c of a chain is 1 exactly where the first c + 2 literals hold, so each world of the network has
@@ -58,6 +60,7 @@ def split_wide(rows: Conjunctions, cardinality: Int32) -> tuple[list[Conjunction
     Args:
         rows: any conjunctions.
         cardinality: shape (n_variables,), of the variables so far.
+        max_arity: literals of a conjunction that is not too wide.
 
     Returns:
         Conjunctions that mean the same, and the cardinalities of all variables, the auxiliary ones appended.
@@ -65,7 +68,7 @@ def split_wide(rows: Conjunctions, cardinality: Int32) -> tuple[list[Conjunction
     k = rows.variable.shape[1]
     others = np.where(np.isfinite(rows.amount)[:, None], 2, cardinality[rows.variable] - 1)
     choices = np.where(rows.equal | (cardinality[rows.variable] <= 2), 1, others)
-    wide = (k > 2) & ((k > MAX_ARITY) | (np.prod(choices, axis=1, dtype=float) > MAX_CELLS))
+    wide = (k > 2) & ((k > max_arity) | (np.prod(choices, axis=1, dtype=float) > MAX_CELLS))
     if not np.any(wide):
         return [rows], cardinality
     parts = [_pick(rows, ~wide)]

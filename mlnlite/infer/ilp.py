@@ -18,11 +18,13 @@ from scipy.sparse.csgraph import connected_components
 
 from mlnlite.ground.network import Bool, Float, Int64
 from mlnlite.infer.conjunctions import Cells
-from mlnlite.infer.parts import Part, PartAnswer
+from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.parts import Part, PartAnswer, all_gains
 
 ILP = "ilp"
 _ABSOLUTE, _RELATIVE = 1e-6, 1e-9
 _FEWEST = 4
+FOREVER = Deadline()
 
 
 @dataclass(slots=True)
@@ -55,44 +57,82 @@ class _Columns:
     n: int
 
 
-def solve_part(part: Part, time_limit: float | None = None, seed: int = 0) -> PartAnswer:
+def solve_part(
+    part: Part, deadline: Deadline = FOREVER, seed: int = 0, *, gap: float = 0.0, start: Int64 | None = None
+) -> PartAnswer:
     """Solves a component.
 
     Args:
         part: the component.
-        time_limit: [s].
+        deadline: when to stop with the best so far.
         seed: of the solver.
+        gap: stop when no world can be better than this share of the cost of the best one.
+        start: shape (n,), a world to start from.
     """
-    binary = part.cardinality == 2
-    width = np.where(binary, 1, part.cardinality).astype(np.int64)
-    columns = _Columns(np.cumsum(width) - width, binary, int(width.sum()))
-    program = _Program([np.zeros(columns.n)], [np.ones(columns.n)], columns.n)
-    _add_blocks(program, columns, part)
-    for cells in part.cells:
-        for rest in _without_cliques(program, columns, cells):
-            _add_cells(program, columns, rest)
-    solver, integer = highspy.Highs(), columns.n  # type: ignore[no-untyped-call]
-    for name, setting in (("output_flag", False), ("random_seed", seed), ("threads", 1), ("mip_rel_gap", 0.0)):
+    program, columns = _program(part)
+    solver = highspy.Highs()  # type: ignore[no-untyped-call]
+    options = {"output_flag": False, "random_seed": seed, "threads": 1, "mip_rel_gap": gap, "mip_abs_gap": _ABSOLUTE}
+    for name, setting in options.items():
         solver.setOptionValue(name, setting)
-    if time_limit is not None:
-        solver.setOptionValue("time_limit", max(0.1, time_limit))
-    solver.passModel(_model(program, integer))
+    if np.isfinite(deadline.left):
+        solver.setOptionValue("time_limit", max(0.1, deadline.left))
+    solver.passModel(_model(program, columns.n))
+    if start is not None:
+        _start(solver, columns, start)
+    _stop_with(solver, deadline)
     solver.run()
     return _answer(solver, columns, part)
 
 
+def _stop_with(solver: highspy.Highs, deadline: Deadline) -> None:
+    """Lets the user interrupt the solver."""
+
+    def interrupt(event: highspy.highs.HighsCallbackEvent) -> None:
+        if deadline.stop.is_set():
+            event.interrupt()
+
+    solver.cbMipInterrupt += interrupt
+    solver.cbSimplexInterrupt += interrupt
+
+
+def _program(part: Part) -> tuple[_Program, _Columns]:
+    """The program of a component; what it minimises is the log-weight of all gains less that of the world."""
+    binary = part.cardinality == 2
+    width = np.where(binary, 1, part.cardinality).astype(np.int64)
+    columns = _Columns(np.cumsum(width) - width, binary, int(width.sum()))
+    program = _Program([np.zeros(columns.n)], [np.ones(columns.n)], columns.n, offset=all_gains(part))
+    _add_blocks(program, columns, part)
+    for cells in part.cells:
+        for rest in _without_cliques(program, columns, cells):
+            _add_cells(program, columns, rest)
+    return program, columns
+
+
+def _start(solver: highspy.Highs, columns: _Columns, world: Int64) -> None:
+    """Hands over a world as values of the integer columns; the solver finds those of the others."""
+    values = np.zeros(columns.n)
+    values[np.where(columns.binary, columns.first, columns.first + world)] = np.where(columns.binary, world, 1.0)
+    solver.setSolution(columns.n, np.arange(columns.n, dtype=np.int32), values)
+
+
 def _answer(solver: highspy.Highs, columns: _Columns, part: Part) -> PartAnswer:
     """Reads the solution."""
-    info, status = solver.getInfo(), solver.getModelStatus()
-    bound = -info.mip_dual_bound + _ABSOLUTE + _RELATIVE * abs(info.mip_dual_bound)
+    info, status, highest = solver.getInfo(), solver.getModelStatus(), all_gains(part)
+    bound = highest - info.mip_dual_bound + _ABSOLUTE + _RELATIVE * abs(info.mip_dual_bound)
     if info.primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
-        return PartAnswer(None, bound, False, ILP)
+        return PartAnswer(None, min(bound, highest), False, ILP)
     x = np.array(solver.getSolution().col_value)[: columns.n]
+    proved = status == highspy.HighsModelStatus.kOptimal and info.mip_gap <= _RELATIVE
+    return PartAnswer(_world(part, columns, x), min(bound, highest), proved, ILP)
+
+
+def _world(part: Part, columns: _Columns, x: Float) -> Int64:
+    """The world of a solution."""
     world = np.where(columns.binary, x[columns.first] > 0.5, 0).astype(np.int64)
     for v in np.flatnonzero(~columns.binary).tolist():
         begin = columns.first[v]
         world[v] = int(x[begin : begin + part.cardinality[v]].argmax())
-    return PartAnswer(world, bound, status == highspy.HighsModelStatus.kOptimal, ILP)
+    return world
 
 
 def _literals(columns: _Columns, scope: Int64, value: Int64) -> tuple[Int64, Float, Float]:
@@ -178,19 +218,15 @@ def _cliques(ends: Int64) -> Iterator[tuple[Int64, Int64]]:
 
 
 def _add_count(program: _Program, literals: tuple[Int64, Float, Float], amount: float) -> None:
-    """Cost of each pair of literals that hold: `c k (k - 1) / 2` for k of them, as its tangents between integers."""
+    """Cost of each pair of literals that hold, `c k (k - 1) / 2` for k of them: number j + 1 of them costs `c j`."""
     column, sign, add = literals
     n = len(column)
     if not np.isfinite(amount):
         _add_rows(program, column[None], sign[None], np.array([1.0 - add.sum()]))
         return
-    count, cost = _add_columns(program, np.zeros(1), float(n)), _add_columns(program, np.ones(1), np.inf)
-    _add_rows(program, np.append(column, count)[None], np.append(sign, -1.0)[None], np.array([-add.sum()]))
-    slopes = np.arange(1, n)
-    pairs = np.stack([np.repeat(count, n - 1), np.repeat(cost, n - 1)], axis=1)
-    _add_rows(
-        program, pairs, np.stack([-amount * slopes, -np.ones(n - 1)], axis=1), -amount * slopes * (slopes + 1) / 2
-    )
+    extra = _add_columns(program, -amount * np.arange(1.0, n), 1.0)
+    row = np.concatenate([column, extra])[None]
+    _add_rows(program, row, np.concatenate([sign, -np.ones(n - 1)])[None], np.array([1.0 - add.sum()]))
 
 
 def _model(program: _Program, n_integer: int) -> highspy.HighsLp:

@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
-from mlnlite.infer import ilp, toulbar2
 from mlnlite.infer.conflict import contradiction
+from mlnlite.infer.deadline import in_seconds, interruptible
+from mlnlite.infer.dominance import without_dominated
 from mlnlite.infer.elimination import best_world
 from mlnlite.infer.marginal import CLOSED_FORM, ELIMINATION, MEMORY_LIMIT, WIDTH_LIMIT, limit_reached
+from mlnlite.infer.narrow import narrowed
 from mlnlite.infer.order import TooWide, plan
-from mlnlite.infer.parts import SMALL, Batch, Part, PartAnswer, batches, divide, parts
+from mlnlite.infer.parts import SMALL, Batch, Part, PartAnswer, all_gains, batches, divide, parts, value_of
 from mlnlite.infer.peel import changed_by, peel, put_back_labels, put_back_values
-from mlnlite.infer.potentials import potentials_of
+from mlnlite.infer.potentials import Potentials, potentials_of
+from mlnlite.infer.rungs import Method, Options, answers_of
 from mlnlite.infer.satisfy import feasible_world
 from mlnlite.infer.score import log_weight, truth_of
 
-Method = Literal["auto", "ve", "wcsp", "ilp"]
 SAT = "satisfiability"
-_FIRST_TRY = 5.0
-_CHEAP = 1 << 21
-_CHEAP_IN_ALL = 1 << 25
+_CHEAP = 1 << 18
+_CHEAP_IN_ALL = 1 << 20
+_DENSE = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,7 @@ class BestWorld:
     @property
     def gap(self) -> float:
         """How much larger the log-weight of another world could at most be."""
-        return self.bound - self.log_weight
+        return float(self.component_gap.sum())
 
 
 @dataclass(slots=True)
@@ -82,46 +83,56 @@ def map_of(
     method: Method = "auto",
     time_limit: float | None = None,
     seed: int = 0,
+    gap: float = 0.0,
     width_limit: int = WIDTH_LIMIT,
 ) -> BestWorld:
     """A most probable world, component by component.
 
     Args:
         network: what was ground.
-        method: "ve" eliminates, "wcsp" uses toulbar2, "ilp" HiGHS; "auto" eliminates where that is cheap, else gives
-            toulbar2 (where it is installed) a few seconds and HiGHS the rest.
-        time_limit: [s] for the solvers, None for no limit.
-        seed: for the solvers.
+        method: which rung answers the components that are not small, see `rungs.answers_of`; "auto" is the cheapest
+            that can.
+        time_limit: [s] for the search, None for no limit. Ctrl-C ends it too; both leave the best world so far.
+        seed: for the search.
+        gap: good enough is a world that costs at most this share more than the best one.
         width_limit: largest number of entries of a table in elimination.
 
     Raises:
         Contradiction: no world satisfies the hard formulas.
         LimitReached: a component is too wide for "ve".
         MissingPart: "wcsp" without toulbar2.
-        QueryMistake: a weight is not known.
+        QueryMistake: a weight is not known, or the method cannot answer such a network.
     """
-    potentials, solvers_only = potentials_of(network), method in ("wcsp", "ilp")
-    core, leaves = (potentials, ()) if solvers_only else peel(potentials, maximise=True)
-    division = divide(core, small=2 if solvers_only else SMALL)
+    deadline = in_seconds(time_limit)
+    potentials = without_dominated(potentials_of(network, max_arity=np.inf))
+    core, leaves = peel(potentials, maximise=True) if method in ("auto", "ve") else (potentials, ())
+    with interruptible(deadline):
+        search, label = _climb(network, core, Options(method, deadline, seed, gap), width_limit)
+    put_back_values(leaves, search.values)
+    label = put_back_labels(leaves, label)
+    for component in np.unique(label[changed_by(leaves)]).tolist():
+        search.method[component] = search.method[component].replace(CLOSED_FORM, ELIMINATION)
+    return _answer(network, label, search)
+
+
+def _climb(network: Network, core: Potentials, options: Options, width_limit: int) -> tuple[_Search, Int32]:
+    """The best worlds of all components, and the component of each variable."""
+    eliminates = options.method in ("auto", "ve")
+    division = divide(core, small=SMALL if eliminates else 2)
     n = division.n_components
-    values = np.zeros(len(potentials.cardinality), np.int64)
-    search = _Search(values, np.zeros(n), [""] * n, ["optimal"] * n, np.zeros(n))
+    search = _Search(np.zeros(len(core.cardinality), np.int64), np.zeros(n), [""] * n, ["optimal"] * n, np.zeros(n))
     everything = np.ones(n, np.bool_)
     for batch in batches(division, everything):
         _list_worlds(batch, search)
     large = parts(division, everything)
-    wide = [p for p in large if solvers_only or not _eliminate(p, method, width_limit, search)]
-    if np.isneginf(potentials.constant) or np.isneginf(search.best).any():
+    wide = [p for p in large if not (eliminates and _eliminate(p, options.method, width_limit, search))]
+    if np.isneginf(core.constant) or np.isneginf(search.best).any():
         raise contradiction(network)
-    if wide and method == "ve":
+    if wide and options.method == "ve":
         raise limit_reached(network, search.wide, width_limit)
-    for part, answers in zip(wide, _search_wide(wide, method, time_limit, seed), strict=True):
+    for part, answers in zip(wide, answers_of(wide, options), strict=True):
         _choose(network, part, answers, search)
-    put_back_values(leaves, search.values)
-    label = put_back_labels(leaves, division.label)
-    for component in np.unique(label[changed_by(leaves)]).tolist():
-        search.method[component] = search.method[component].replace(CLOSED_FORM, ELIMINATION)
-    return _answer(network, label, search)
+    return search, division.label
 
 
 def _answer(network: Network, label: Int32, search: _Search) -> BestWorld:
@@ -134,7 +145,7 @@ def _answer(network: Network, label: Int32, search: _Search) -> BestWorld:
     return BestWorld(
         truth=truth,
         log_weight=value,
-        bound=value + float(search.gap.sum()),
+        bound=value + float(search.gap[used].sum()),
         status="optimal" if all(s == "optimal" for s in status) else "feasible",
         component=component.ravel(),
         component_status=status,
@@ -162,30 +173,19 @@ def _eliminate(part: Part, method: Method, width_limit: int, search: _Search) ->
     largest, total = width_limit, max(MEMORY_LIMIT, width_limit)
     if method == "auto":
         largest, total = min(width_limit, _CHEAP), _CHEAP_IN_ALL
+        if sum(len(c.amount) for c in part.cells if c.scope.shape[1] > 1) > _DENSE * len(part.variables):
+            return False
+    n, part = len(part.variables), narrowed(part)
     tree = plan(part.cardinality, [c.scope for c in part.cells], largest, total)
     if isinstance(tree, TooWide):
         search.wide.append((part, tree))
         return False
     value, world = best_world(tree, part.cardinality, part.cells)
-    search.values[part.variables] = world
+    search.values[part.variables] = world[:n]
     search.best[part.component] = value
     search.method[part.component] = ELIMINATION
     search.largest_table = max(search.largest_table, *tree.sizes)
     return True
-
-
-def _search_wide(wide: list[Part], method: Method, time_limit: float | None, seed: int) -> Iterator[list[PartAnswer]]:
-    """What toulbar2 says of each component, and HiGHS where that is no proof."""
-    end = time.monotonic() + (np.inf if time_limit is None else time_limit)
-    answers: list[list[PartAnswer]] = [[] for _ in wide]
-    if wide and (method == "wcsp" or (method == "auto" and toulbar2.is_available())):
-        few = _FIRST_TRY * len(wide) if time_limit is None else min(_FIRST_TRY * len(wide), time_limit / 3)
-        answers = [[a] for a in toulbar2.solve_parts(wide, time_limit if method == "wcsp" else few, seed)]
-    for i, (part, found) in enumerate(zip(wide, answers, strict=True)):
-        if method != "wcsp" and not any(a.optimal for a in found):
-            left = None if time_limit is None else (end - time.monotonic()) / (len(wide) - i)
-            found.append(ilp.solve_part(part, left, seed))
-        yield found
 
 
 def _choose(network: Network, part: Part, answers: list[PartAnswer], search: _Search) -> None:
@@ -193,22 +193,13 @@ def _choose(network: Network, part: Part, answers: list[PartAnswer], search: _Se
     worlds = [(a.world, a.method) for a in answers]
     if all(world is None for world, _ in worlds):
         worlds = [(feasible_world(part), SAT)]
-    scored = [(*_value_and_bound(part, world), world, name) for world, name in worlds if world is not None]
+    scored = [(value_of(part, world), world, name) for world, name in worlds if world is not None]
     if not scored:
         raise contradiction(network)
-    value, highest, world, name = max(scored, key=lambda s: s[0])
+    value, world, name = max(scored, key=lambda s: s[0])
     proved = any(a.optimal for a in answers)
     search.values[part.variables] = world
     search.best[part.component] = value
     search.method[part.component] = next((a.method for a in answers if a.optimal), name)
     search.status[part.component] = "optimal" if proved else "feasible"
-    search.gap[part.component] = max(0.0, min(highest, *(a.bound for a in answers)) - value)
-
-
-def _value_and_bound(part: Part, world: Int64) -> tuple[float, float]:
-    """Log-weight of a world of a component, and the sum of all gains, which no world can pass."""
-    value = highest = 0.0
-    for c in part.cells:
-        value += float(c.amount[(world[c.scope] == c.value).all(axis=1)].sum())
-        highest += float(c.amount[c.amount > 0].sum())
-    return value, highest
+    search.gap[part.component] = max(0.0, min(all_gains(part), *(a.bound for a in answers)) - value)

@@ -188,3 +188,18 @@ def parts(division: Division, take: Bool) -> Iterator[Part]:
                 if b[r] < b[r + 1]
             )
             yield Part(int(number[r]), variables, division.potentials.cardinality[variables], cells)
+
+
+def all_gains(part: Part) -> float:
+    """The sum of all gains, which no world can pass."""
+    return float(sum(c.amount[c.amount > 0].sum() for c in part.cells))
+
+
+def value_of(part: Part, world: Int64) -> float:
+    """Log-weight of a world of a component.
+
+    Args:
+        part: the component.
+        world: shape (n,), a value for each variable.
+    """
+    return float(sum(c.amount[(world[c.scope] == c.value).all(axis=1)].sum() for c in part.cells))

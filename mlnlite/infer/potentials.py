@@ -9,7 +9,7 @@ import numpy as np
 
 from mlnlite.errors import QueryMistake
 from mlnlite.ground.network import Bool, Clauses, Float, Int32, Int64, Network, Tables
-from mlnlite.infer.conjunctions import Cells, Conjunctions, cells_of, split_wide
+from mlnlite.infer.conjunctions import MAX_ARITY, Cells, Conjunctions, cells_of, split_wide
 from mlnlite.infer.propagate import propagate
 
 
@@ -29,13 +29,16 @@ class Potentials:
     constant: float
 
 
-def potentials_of(network: Network, extra: Sequence[Conjunctions] = (), auxiliary: int = 0) -> Potentials:
+def potentials_of(
+    network: Network, extra: Sequence[Conjunctions] = (), auxiliary: int = 0, max_arity: float = MAX_ARITY
+) -> Potentials:
     """The log-potentials of a network.
 
     Args:
         network: what was ground.
         extra: further conjunctions, over the variables of the network and `auxiliary` binary ones after them.
         auxiliary: number of those.
+        max_arity: longer conjunctions become chains of auxiliary variables.
 
     Raises:
         QueryMistake: a weight is not known.
@@ -50,7 +53,7 @@ def potentials_of(network: Network, extra: Sequence[Conjunctions] = (), auxiliar
     cardinality = np.concatenate([network.cardinality, np.full(auxiliary, 2, np.int32)])
     narrow: list[Conjunctions] = []
     for row in rows:
-        parts, cardinality = split_wide(row, cardinality)
+        parts, cardinality = split_wide(row, cardinality, max_arity)
         narrow += parts
     cells: list[Cells] = []
     for row in narrow:

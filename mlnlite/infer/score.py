@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mlnlite.ground.network import Bool, Int64, Network
+from mlnlite.ground.network import Bool, Float, Int64, Network
 from mlnlite.infer.potentials import check_weights
 
 
@@ -25,7 +25,29 @@ def counts(network: Network, truth: Bool) -> Int64:
     for tables in network.tables:
         holds = tables.truth[tuple(truth[tables.atoms].T.astype(np.int64))]
         np.add.at(total, tables.weight[holds], tables.count[holds])
+    for group in network.counts:
+        n_true = (truth[np.abs(group.literals) - 1] == (group.literals > 0)).sum(axis=1)
+        np.add.at(total, group.weight, group.count * group.true[n_true])
     return total
+
+
+def costs(network: Network, truth: Bool) -> tuple[Float, Float]:
+    """What a world pays for each soft weight: for false groundings if it is positive, for true ones if it is negative.
+
+    Args:
+        network: of which.
+        truth: shape (n_atoms,).
+
+    Returns:
+        Shapes (n_weights,): over all groundings, and over those that evidence leaves open.
+    """
+    true = counts(network, truth)
+    soft = np.isfinite(network.weights)
+    weight = np.where(soft, np.abs(network.weights), 0.0)
+    positive = network.weights > 0
+    open_true = true - network.decided_true
+    total = np.where(positive, network.n_groundings - true, true)
+    return weight * total, weight * np.where(positive, network.n_open - open_true, open_true)
 
 
 def log_weight(network: Network, truth: Bool) -> float:

@@ -1,34 +1,26 @@
 """Best worlds by toulbar2 (weighted constraint satisfaction), in a process of its own.
 
-Comes in components as cells, goes out for each a world, its value, an upper bound and whether it is proved best.
+Comes in a component as cells, goes out a world, an upper bound and whether the world is proved best.
 Costs are integers, `-amount * scale` rounded, so values are known up to half a unit for each cell; bounds allow for it.
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from importlib.util import find_spec
 from itertools import pairwise
-from pathlib import Path
-from threading import Timer
-from typing import IO
 
 import numpy as np
 
 from mlnlite.errors import MissingPart
 from mlnlite.ground.network import Float
 from mlnlite.infer.conjunctions import Cells
+from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.parts import Part, PartAnswer
+from mlnlite.infer.workers import Ask
 
 WCSP = "wcsp"
 _LARGEST_COST = 2.0**50
 _FINEST = 9
-_GRACE = 10.0
 
 
 def is_available() -> bool:
@@ -36,12 +28,13 @@ def is_available() -> bool:
     return find_spec("pytoulbar2") is not None
 
 
-def solve_parts(parts: Sequence[Part], time_limit: float | None = None, seed: int = 0) -> list[PartAnswer]:
-    """Solves components one after the other.
+def solve_part(part: Part, ask: Ask, deadline: Deadline, seed: int = 0) -> PartAnswer:
+    """Solves a component.
 
     Args:
-        parts: the components.
-        time_limit: [s] for all of them together; each gets an equal share of what is left.
+        part: the component.
+        ask: what runs the solver.
+        deadline: when to stop with the best so far.
         seed: of the solver.
 
     Raises:
@@ -49,46 +42,10 @@ def solve_parts(parts: Sequence[Part], time_limit: float | None = None, seed: in
     """
     if not is_available():
         raise MissingPart("toulbar2 is not installed", hint="pip install pytoulbar2 (not made for Windows)")
-    end = None if time_limit is None else time.monotonic() + time_limit
-    answers = []
-    with _worker(time_limit) as (to_worker, from_worker):
-        for i, part in enumerate(parts):
-            problem, scale, rounding = _problem(part)
-            left = 0 if end is None else max(1, int((end - time.monotonic()) / (len(parts) - i)))
-            problem |= {"seconds": left, "seed": seed + 1}
-            try:
-                to_worker.write(json.dumps(problem) + "\n")
-                to_worker.flush()
-                line = from_worker.readline()
-            except BrokenPipeError:
-                line = ""
-            answers.append(_answer(line, scale, rounding))
-    return answers
-
-
-@contextmanager
-def _worker(time_limit: float | None) -> Iterator[tuple[IO[str], IO[str]]]:
-    """A running worker: its input and its output. It is ended well after the time limit if it does not stop itself."""
-    command = [sys.executable, "-P", str(Path(__file__).with_name("_toulbar2_worker.py"))]
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-    ) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        timer = None if time_limit is None else Timer(2 * time_limit + _GRACE, process.kill)
-        if timer:
-            timer.start()
-        try:
-            yield process.stdin, process.stdout
-        finally:
-            if timer:
-                timer.cancel()
-            process.kill()
-
-
-def _answer(line: str, scale: float, rounding: float) -> PartAnswer:
-    """The worker's line, scaled back; an empty one if the worker had to be ended."""
-    reply = json.loads(line) if line else {"state": None, "bound": None, "optimal": False}
+    problem, scale, rounding = _problem(part)
+    left = deadline.left
+    problem |= {"seconds": max(1, int(left)) if np.isfinite(left) else 0, "seed": seed + 1}
+    reply = ask("_toulbar2_worker", problem, left) or {"state": None, "bound": None, "optimal": False}
     world = None if reply["state"] is None else np.array(reply["state"], np.int64)
     bound = np.inf if reply["bound"] is None else -reply["bound"] / scale + rounding
     return PartAnswer(world, bound, bool(reply["optimal"]), WCSP)
