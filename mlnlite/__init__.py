@@ -42,11 +42,13 @@ if TYPE_CHECKING:
     from mlnlite.model.facts import closed as closed
     from mlnlite.model.facts import no_evidence as no_evidence
     from mlnlite.model.model import Model as Model
+    from mlnlite.model.read import evidence_from_tables as evidence_from_tables
     from mlnlite.model.read import evidence_from_text as evidence_from_text
     from mlnlite.model.read import model_from_text as model_from_text
     from mlnlite.model.read import one_database as one_database
     from mlnlite.model.read import read_evidence as read_evidence
     from mlnlite.model.read import read_model as read_model
+    from mlnlite.model.table import Table as Table
     from mlnlite.model.unparse import model_text as model_text
     from mlnlite.results import MapState as MapState
     from mlnlite.results import Marginals as Marginals
@@ -70,11 +72,13 @@ _HOMES = {
     "closed": "mlnlite.model.facts",
     "no_evidence": "mlnlite.model.facts",
     "Model": "mlnlite.model.model",
+    "evidence_from_tables": "mlnlite.model.read",
     "evidence_from_text": "mlnlite.model.read",
     "model_from_text": "mlnlite.model.read",
     "one_database": "mlnlite.model.read",
     "read_evidence": "mlnlite.model.read",
     "read_model": "mlnlite.model.read",
+    "Table": "mlnlite.model.table",
     "model_text": "mlnlite.model.unparse",
     "MapState": "mlnlite.results",
     "Marginals": "mlnlite.results",

@@ -23,6 +23,7 @@ from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import All, Any, AtomRef, Equal, Expression, Iff, Not
 from mlnlite.model.model import Model
 from mlnlite.model.propositional import Cube, cubes, without_quantifiers
+from mlnlite.model.soft import soft_templates
 from mlnlite.model.templates import Template
 
 Int64 = NDArray[np.int64]
@@ -89,7 +90,8 @@ def prepared(model: Model, evidence: Evidence) -> tuple[Model, Evidence, Tables]
     verify_same_vocabulary(model, evidence)
     _verify_weights(model)
     evidence = completed(evidence)
-    model = replace(model, templates=tuple(t.expanded(evidence.types) for t in model.templates))
+    templates = (*model.templates, *soft_templates(evidence))
+    model = replace(model, templates=tuple(t.expanded(evidence.types) for t in templates))
     return model, evidence, {**tables_of(evidence), **row_tables(model)}
 
 

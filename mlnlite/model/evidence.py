@@ -32,6 +32,24 @@ class Facts:
     truth: NDArray[np.bool_]
 
 
+@dataclass(frozen=True, slots=True)
+class SoftFacts:
+    """Soft evidence about one predicate: `0.7 P(a)` makes worlds with P(a) 0.7/0.3 times as likely as without it.
+
+    This is virtual evidence: a factor, not the probability that comes out. Several about one atom multiply.
+    `?P(a)` is the same with 0.5: it says nothing but that the atom is there and open.
+
+    Attributes:
+        database: shape (n,), number of the database.
+        arguments: shape (n, arity), constant ids.
+        weight: shape (n,), log-odds.
+    """
+
+    database: Int32
+    arguments: Int32
+    weight: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class Evidence:
     """Facts of one or more databases (worlds that have nothing to do with each other but share a model).
@@ -46,6 +64,8 @@ class Evidence:
         n_databases: how many.
         names: where each database is from.
         warnings: what reading found strange.
+        soft: by predicate name: soft evidence; predicates without any are left out.
+        cuts: for arguments (predicate, index) that were divided into bins, the cut points.
     """
 
     types: Mapping[str, Type]
@@ -55,6 +75,8 @@ class Evidence:
     n_databases: int = 1
     names: tuple[str, ...] = ()
     warnings: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
+    soft: Mapping[str, SoftFacts] = field(default_factory=dict)
+    cuts: Mapping[tuple[str, int], tuple[float, ...]] = field(default_factory=dict)
 
     def sizes(self, predicate: str) -> tuple[int, ...]:
         """Number of constants of each argument of a predicate."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -9,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean, in_order
-from mlnlite.model.evidence import Evidence, Facts
+from mlnlite.model.coded import Coded, CodedTable
+from mlnlite.model.evidence import Evidence, Facts, SoftFacts
 from mlnlite.model.model import Model
+from mlnlite.model.soft import SoftColumns, soft_facts
 from mlnlite.model.symbols import Predicate, Type
 from mlnlite.source import Source, Span
-from mlnlite.syntax.tree import EvidenceProgram, FactTable
+from mlnlite.syntax.tree import EvidenceProgram, FactTable, SoftFact
 
 MOST_MISTAKES = 50
 """Mistakes reported for one predicate of one file; more are counted."""
@@ -37,6 +40,8 @@ class _Reading:
     sources: list[Source]
     declared: list[tuple[int, int, str, list[int]]] = field(default_factory=list)
     columns: dict[str, _Columns] = field(default_factory=dict)
+    soft: dict[str, SoftColumns] = field(default_factory=dict)
+    cuts: dict[tuple[str, int], tuple[float, ...]] = field(default_factory=dict)
     mistakes: list[Diagnostic] = field(default_factory=list)
 
     def ids(self, type_name: str, column: Iterable[str]) -> NDArray[np.int32]:
@@ -50,13 +55,27 @@ class _Reading:
             return np.fromiter(map(index.__getitem__, column), np.int32)
 
 
+@dataclass(frozen=True, slots=True)
+class TableFacts:
+    """A table as a program of evidence: one database."""
+
+    facts: tuple[CodedTable, ...]
+    types: tuple[()] = ()
+    n_databases: int = 1
+    soft: tuple[()] = ()
+
+
 def check_evidence(
-    programs: Sequence[EvidenceProgram], sources: Sequence[Source], model: Model, *, together: bool = False
+    programs: Sequence[EvidenceProgram | TableFacts],
+    sources: Sequence[Source],
+    model: Model,
+    *,
+    together: bool = False,
 ) -> Evidence:
-    """The evidence that files mean.
+    """The evidence that files and tables mean.
 
     Args:
-        programs: one for each file.
+        programs: one for each file; all tables are about one world, the last of them.
         sources: their texts, for messages.
         model: what the facts are about.
         together: the files describe one world and have one database each; otherwise each database is a world.
@@ -73,17 +92,46 @@ def check_evidence(
             message = f"{sources[file].name} has {program.n_databases} databases; together with others, each has one"
             reading.mistakes.append(Diagnostic("E310", message, hint=hint))
         _read_file(program, file, first, reading)
-        first += 0 if together else program.n_databases
-    n_databases = 1 if together else first
+        first += 0 if together or isinstance(program, TableFacts) else program.n_databases
+    tabled = any(isinstance(p, TableFacts) for p in programs)
+    n_databases = 1 if together else first + tabled
     facts = {name: _sorted(name, reading) for name in model.predicates}
     if reading.mistakes:
         raise EvidenceMistake(in_order(reading.mistakes))
     result_types = {name: Type(name, tuple(index)) for name, index in reading.types.items()}
     present = _present(model, result_types, facts, n_databases, reading)
-    names = tuple(f"{s.name}#{i + 1}" for s, p in zip(sources, programs, strict=True) for i in range(p.n_databases))
+    names = [
+        f"{s.name}#{i + 1}"
+        for s, p in zip(sources, programs, strict=True)
+        if not isinstance(p, TableFacts)
+        for i in range(p.n_databases)
+    ]
     return Evidence(
-        result_types, dict(model.predicates), facts, present, n_databases, names if not together else ("evidence",)
+        result_types,
+        dict(model.predicates),
+        facts,
+        present,
+        n_databases,
+        ("evidence",) if together else (*names, *["tables"] * tabled),
+        soft=_softened(reading, facts, model),
+        cuts=reading.cuts,
     )
+
+
+def _softened(reading: _Reading, facts: Mapping[str, Facts], model: Model) -> dict[str, SoftFacts]:
+    """The soft facts.
+
+    Raises:
+        EvidenceMistake: about atoms that are certain, or predicates whose world is closed.
+    """
+    mistakes: list[Diagnostic] = []
+    soft = {}
+    for name, columns in reading.soft.items():
+        place = [_fact_span(reading.sources[f], o) for f, o in columns.places]
+        soft[name] = soft_facts(columns, model.predicates[name], facts[name], place, mistakes)
+    if mistakes:
+        raise EvidenceMistake(in_order(mistakes))
+    return soft
 
 
 def no_evidence(model: Model) -> Evidence:
@@ -97,6 +145,11 @@ def closed(evidence: Evidence, predicates: Iterable[str]) -> Evidence:
     for name in sorted(names - set(evidence.predicates)):
         hint = did_you_mean(name, list(evidence.predicates))
         raise EvidenceMistake([Diagnostic("E311", f"there is no predicate {name} to close the world of", hint=hint)])
+    uncertain = sorted(names & set(evidence.soft))
+    if uncertain:
+        message = f"{uncertain[0]} has soft evidence or unknown facts, so its world cannot be closed"
+        hint = "leave it open (`--open-world`); for learning, decide whether its facts are true"
+        raise EvidenceMistake([Diagnostic("E315", message, hint=hint)])
     changed = {n: replace(p, closed=True) if n in names else p for n, p in evidence.predicates.items()}
     return replace(evidence, predicates=changed)
 
@@ -104,7 +157,7 @@ def closed(evidence: Evidence, predicates: Iterable[str]) -> Evidence:
 # --- one file
 
 
-def _read_file(program: EvidenceProgram, file: int, first: int, reading: _Reading) -> None:
+def _read_file(program: EvidenceProgram | TableFacts, file: int, first: int, reading: _Reading) -> None:
     for declaration in program.types:
         if declaration.name not in reading.types:
             hint = did_you_mean(declaration.name, list(reading.types))
@@ -115,27 +168,71 @@ def _read_file(program: EvidenceProgram, file: int, first: int, reading: _Readin
         reading.declared.append((first, first + program.n_databases, declaration.name, ids.tolist()))
     for table in program.facts:
         _read_table(table, file, first, reading)
+    for fact in program.soft:
+        _read_soft(fact, file, first, reading)
 
 
-def _read_table(table: FactTable, file: int, first: int, reading: _Reading) -> None:
-    predicate = reading.predicates.get(table.predicate)
-    if predicate is None:
-        hint = did_you_mean(table.predicate, list(reading.predicates)) or "the model does not declare it"
-        _each(table, file, "E302", f"the predicate {table.predicate} is not declared", hint, reading)
+def _predicate(name: str, arity: int, reading: _Reading) -> Predicate | tuple[str, str, str]:
+    """The predicate of facts, or code, message and hint of what is wrong."""
+    predicate = reading.predicates.get(name)
+    if predicate is None or predicate.comparison:
+        hint = did_you_mean(name, list(reading.predicates)) or "the model does not declare it"
+        return "E302", f"the predicate {name} is not declared", hint
+    if arity != predicate.arity:
+        return "E303", f"{predicate.name} takes {predicate.arity}, found {arity}", f"it is declared as {predicate}"
+    return predicate
+
+
+def _read_soft(fact: SoftFact, file: int, first: int, reading: _Reading) -> None:
+    predicate = _predicate(fact.predicate, len(fact.arguments), reading)
+    if isinstance(predicate, tuple):
+        code, message, hint = predicate
+        reading.mistakes.append(Diagnostic(code, message, fact.span, hint))
         return
-    if len(table.columns) != predicate.arity:
-        message = f"{predicate.name} takes {predicate.arity}, found {len(table.columns)}"
-        _each(table, file, "E303", message, f"it is declared as {predicate}", reading)
+    ids = [int(reading.ids(t, [a])[0]) for t, a in zip(predicate.types, fact.arguments, strict=True)]
+    weight = math.log(fact.probability / (1 - fact.probability))
+    columns = reading.soft.setdefault(predicate.name, SoftColumns())
+    columns.add([fact.database + first], [ids], [weight], [(file, fact.span.start if fact.span else 0)])
+
+
+def _ids(type_name: str, column: list[str] | Coded, reading: _Reading) -> NDArray[np.int32]:
+    if isinstance(column, Coded):
+        return np.asarray(reading.ids(type_name, column.names)[column.codes], np.int32)
+    return reading.ids(type_name, column)
+
+
+def _read_table(table: FactTable | CodedTable, file: int, first: int, reading: _Reading) -> None:
+    predicate = _predicate(table.predicate, len(table.columns), reading)
+    if isinstance(predicate, tuple):
+        if isinstance(table, FactTable):
+            _each(table, file, *predicate, reading)
         return
     arguments = np.empty((len(table.truth), predicate.arity), np.int32)
+    columns: Sequence[list[str] | Coded] = table.columns
+    for i, (type_name, column) in enumerate(zip(predicate.types, columns, strict=True)):
+        arguments[:, i] = _ids(type_name, column, reading)
+    if isinstance(table, CodedTable):
+        _mention(table, predicate, first, reading)
+        if table.soft is not None:
+            places = [(file, int(o)) for o in table.offset]
+            soft = reading.soft.setdefault(predicate.name, SoftColumns())
+            soft.add(table.database + first, arguments, table.soft, places)
+            return
+    known = reading.columns.setdefault(predicate.name, _Columns())
+    known.database.append(np.asarray(table.database, np.int32) + np.int32(first))
+    known.arguments.append(arguments)
+    known.truth.append(np.asarray(table.truth, np.bool_))
+    known.file.append(np.full(len(arguments), file, np.int32))
+    known.offset.append(np.asarray(table.offset, np.int64))
+
+
+def _mention(table: CodedTable, predicate: Predicate, first: int, reading: _Reading) -> None:
+    """Notes the constants of all rows, those that say nothing included, and cut points."""
     for i, (type_name, column) in enumerate(zip(predicate.types, table.columns, strict=True)):
-        arguments[:, i] = reading.ids(type_name, column)
-    columns = reading.columns.setdefault(predicate.name, _Columns())
-    columns.database.append(np.asarray(table.database, np.int32) + np.int32(first))
-    columns.arguments.append(arguments)
-    columns.truth.append(np.asarray(table.truth, np.bool_))
-    columns.file.append(np.full(len(arguments), file, np.int32))
-    columns.offset.append(np.asarray(table.offset, np.int64))
+        ids = reading.ids(type_name, column.names)
+        reading.declared.append((first, first + 1, type_name, ids.tolist()))
+        if i in table.cuts:
+            reading.cuts[predicate.name, i] = table.cuts[i]
 
 
 def _each(table: FactTable, file: int, code: str, message: str, hint: str, reading: _Reading) -> None:
@@ -226,4 +323,8 @@ def _present(
         table = facts[predicate.name]
         for i, name in enumerate(predicate.types):
             present[name][table.database, table.arguments[:, i]] = True
+        if predicate.name in reading.soft:
+            soft = reading.soft[predicate.name].facts()
+            for i, name in enumerate(predicate.types):
+                present[name][soft.database, soft.arguments[:, i]] = True
     return present

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from os import PathLike
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from os import PathLike, fspath
+from pathlib import Path as FilePath
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from mlnlite.errors import EvidenceMistake
+from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean
 from mlnlite.model.check import check
 from mlnlite.model.evidence import Evidence, Facts
-from mlnlite.model.facts import check_evidence
+from mlnlite.model.facts import TableFacts, check_evidence
 from mlnlite.model.model import Model
+from mlnlite.model.soft import of_database
+from mlnlite.model.table import Table, read_mapping
 from mlnlite.source import Source
 from mlnlite.syntax.evidence import parse_evidence
 from mlnlite.syntax.files import read_source
 from mlnlite.syntax.parse import parse_model
-from mlnlite.syntax.tree import Dialect
+from mlnlite.syntax.tree import Dialect, EvidenceProgram
 
 Path: TypeAlias = str | PathLike[str]
 
@@ -42,10 +46,12 @@ def model_from_text(text: str, *, dialect: Dialect | None = None) -> Model:
 
 
 def read_evidence(*paths: Path, model: Model, together: bool = False) -> Evidence:
-    """Reads evidence from `.db` files.
+    """Reads evidence from files.
 
     Args:
-        paths: the files.
+        paths: `.db` files; `Friends=friends.csv` for a table of facts about Friends (also Parquet, JSON lines, and
+            `FILE::TABLE` of SQLite or DuckDB), and `.toml` files that name tables (see `Table`). All tables are about
+            one world.
         model: what the facts are about.
         together: all files describe one world; otherwise each database, in files or between `---`, is one of its own.
 
@@ -53,7 +59,37 @@ def read_evidence(*paths: Path, model: Model, together: bool = False) -> Evidenc
         SyntaxMistake: if a text is not in the language.
         EvidenceMistake: if facts do not fit the model or each other.
     """
-    return _evidence([read_source(path) for path in paths], model, together=together)
+    texts, tables = [], []
+    for path in (fspath(p) for p in paths):
+        name, equals, source = path.partition("=")
+        if equals and name.isidentifier():
+            tables.append((name, Table(source)))
+        elif path.endswith(".toml"):
+            tables += read_mapping(FilePath(path))
+        else:
+            texts.append(read_source(path))
+    return _evidence(texts, model, together=together, tables=tables)
+
+
+def evidence_from_tables(tables: Mapping[str, Any], *, model: Model) -> Evidence:
+    """Evidence about one world from tables.
+
+    Args:
+        tables: for each predicate a `Table`, or what can be its `source`: a file, a data frame (pandas, Polars, Arrow),
+            a mapping from names to columns.
+        model: what the facts are about.
+
+    Raises:
+        EvidenceMistake: if a table cannot be read or does not fit the model, or facts contradict each other.
+
+    >>> from mlnlite.model.read import model_from_text
+    >>> model = model_from_text("Friends(person, person)")
+    >>> evidence = evidence_from_tables({"Friends": {"from": ["Anna"], "to": ["Bob"]}}, model=model)
+    >>> evidence.types["person"].constants
+    ('Anna', 'Bob')
+    """
+    given = [(name, t if isinstance(t, Table) else Table(t)) for name, t in tables.items()]
+    return _evidence([], model, together=True, tables=given)
 
 
 def evidence_from_text(text: str, *, model: Model) -> Evidence:
@@ -61,9 +97,24 @@ def evidence_from_text(text: str, *, model: Model) -> Evidence:
     return _evidence([Source("<text>", text)], model, together=False)
 
 
-def _evidence(sources: Sequence[Source], model: Model, *, together: bool) -> Evidence:
-    programs = [parse_evidence(source, model.dialect) for source in sources]
-    return check_evidence(programs, sources, model, together=together)
+def _evidence(
+    texts: Sequence[Source], model: Model, *, together: bool, tables: Sequence[tuple[str, Table]] = ()
+) -> Evidence:
+    programs: list[EvidenceProgram | TableFacts] = [parse_evidence(source, model.dialect) for source in texts]
+    sources, warnings = list(texts), []
+    for name, table in tables:
+        predicate = model.predicates.get(name)
+        if predicate is None:
+            hint = did_you_mean(name, list(model.predicates))
+            raise EvidenceMistake([Diagnostic("E302", f"the predicate {name} is not declared", hint=hint)])
+        from mlnlite.model.tabular import read_table
+
+        coded, source, found = read_table(predicate, table)
+        programs.append(TableFacts((coded,)))
+        sources.append(source)
+        warnings += found
+    evidence = check_evidence(programs, sources, model, together=together)
+    return replace(evidence, warnings=evidence.warnings + tuple(warnings)) if warnings else evidence
 
 
 def one_database(evidence: Evidence, index: int) -> Evidence:
@@ -79,4 +130,5 @@ def one_database(evidence: Evidence, index: int) -> Evidence:
         mine = table.database == index
         facts[name] = Facts(np.zeros(int(mine.sum()), np.int32), table.arguments[mine], table.truth[mine])
     present = {name: p[index : index + 1] for name, p in evidence.present.items()}
-    return Evidence(evidence.types, evidence.predicates, facts, present, 1, (evidence.names[index],), evidence.warnings)
+    names, soft = (evidence.names[index],), of_database(evidence.soft, index)
+    return replace(evidence, facts=facts, present=present, n_databases=1, names=names, soft=soft)

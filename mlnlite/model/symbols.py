@@ -38,6 +38,8 @@ class Predicate:
         marker: `!` exactly one value, `?` at most one, empty if `value` is None.
         closed: what is not a fact is false.
         span: where it was declared.
+        comparison: of the predicates that stand for comparisons of numbers (`x < y`), how it is written, with `{0}`,
+            `{1}`, ... in place of the arguments. Their facts follow from the constants.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Predicate:
     marker: Literal["", "!", "?"] = ""
     closed: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
+    comparison: str = ""
 
     @property
     def arity(self) -> int:

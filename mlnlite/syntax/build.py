@@ -32,13 +32,14 @@ class Weight:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One fact; `truth` is the number in front of it, if any."""
+    """One fact; `truth` is the number in front of it, if any; `unknown` if it has a question mark instead."""
 
     predicate: str
     arguments: tuple[str, ...]
     positive: bool
     truth: float | None
     span: Span
+    unknown: bool = False
 
 
 def unquote(text: str) -> str:
@@ -230,7 +231,12 @@ def _fact(place: Place, span: Span, children: Children) -> Fact:
         raise SyntaxMistake([mistake("E108", place.token(children[0]), hint, number=children[0])])
     truth = float(children[0]) if types[0] == "NUMBER" else None
     arguments = tuple(constant.name for constant in _nodes(children))
-    return Fact(str(children[types.index("NAME")]), arguments, "NOT" not in types, truth, span)
+    return Fact(str(children[types.index("NAME")]), arguments, "NOT" not in types, truth, span, "QUESTION" in types)
+
+
+def _value(place: Place, span: Span, children: Children) -> Fact:
+    value, *arguments = (constant.name for constant in _nodes(children))
+    return Fact(str(children[2]), (*arguments, value), True, None, span)
 
 
 BUILDERS: dict[str, Callable[[Place, Span, Children], Any]] = {
@@ -260,4 +266,5 @@ BUILDERS: dict[str, Callable[[Place, Span, Children], Any]] = {
     "argument": _argument,
     "type_declaration": _type_declaration,
     "fact": _fact,
+    "value": _value,
 }

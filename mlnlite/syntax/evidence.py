@@ -14,13 +14,14 @@ from mlnlite.syntax.includes import ANY_INCLUDE, File, load
 from mlnlite.syntax.lines import split_facts
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
-from mlnlite.syntax.tree import Dialect, EvidenceProgram, FactTable, TypeDeclaration
+from mlnlite.syntax.tree import Dialect, EvidenceProgram, FactTable, SoftFact, TypeDeclaration
 
 MAX_MISTAKES = 100
 _MANY = 20_000
 # A fact on a line of its own whose constants are plain words: a subset of what the grammar accepts.
 _WORD = r" *+-?\w++(?:[-.]\w++)*+ *+"
 _FACT = re.compile(rf"^[ \t]*+(!?)([^\W\d]\w*+)\(({_WORD}(?:,{_WORD})*+)\)[ \t\r]*+$", re.MULTILINE)
+_VALUE = re.compile(r'(?:-?\w[\w.:/$-]*|"(?:[^"\\\n]|\\[^\n])*")\s*=(?!\s*\{)')
 _TYPE = re.compile(r"[^\W\d][\w'-]*\s*=\s*\{")
 
 
@@ -43,6 +44,7 @@ class _Reading:
         rows: the facts by predicate and number of arguments.
         constants: every constant once, so that equal ones share one string.
         types: the type declarations.
+        soft: the soft facts.
         database: number of the database that is being read.
         separator: a `---` after which nothing has been read yet.
         offset: where facts stand if they come from an included file: at its `#include`.
@@ -52,6 +54,7 @@ class _Reading:
     rows: dict[tuple[str, int], _Rows] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
     types: list[TypeDeclaration] = field(default_factory=list)
+    soft: list[SoftFact] = field(default_factory=list)
     database: int = 0
     separator: bool = False
     offset: int | None = None
@@ -79,7 +82,7 @@ def parse_evidence(source: Source, dialect: Dialect) -> EvidenceProgram:
         raise SyntaxMistake(reading.mistakes)
     n_databases = reading.database + (not reading.separator)
     span = Span(source, 0, len(source.text))
-    return EvidenceProgram(tuple(_tables(reading)), tuple(reading.types), n_databases, span)
+    return EvidenceProgram(tuple(_tables(reading)), tuple(reading.types), n_databases, tuple(reading.soft), span)
 
 
 def _tables(reading: _Reading) -> Iterator[FactTable]:
@@ -162,19 +165,32 @@ def _read_statement(file: File, start: int, end: int, reading: _Reading) -> None
     elif _TYPE.match(text):
         reading.types.append(parse_node("type_declaration", text, Place(source, start), "evidence"))
     else:
-        fact: Fact = parse_node("fact", text, Place(source, start), "evidence")
-        _add(reading, fact, fact.positive == _truth(fact), start)
+        rule = "value" if _VALUE.match(text) else "fact"
+        fact: Fact = parse_node(rule, text, Place(source, start), "evidence")
+        if fact.unknown or not _is_certain(fact):
+            _add_soft(reading, fact, start)
+        else:
+            _add(reading, fact, fact.positive == (fact.truth != 0.0), start)
 
 
-def _truth(fact: Fact) -> bool:
-    """Whether the number in front of a fact, if any, says that it is true."""
-    if fact.truth is None:
+def _add_soft(reading: _Reading, fact: Fact, start: int) -> None:
+    if fact.unknown and not fact.positive:
+        hint = "write `?` alone to leave the fact open, or `!` alone if it is false"
+        raise SyntaxMistake([mistake("E145", fact.span, hint)])
+    probability = 0.5 if fact.truth is None else fact.truth if fact.positive else 1 - fact.truth
+    assert fact.span is not None
+    place = Span(fact.span.source, start if reading.offset is None else reading.offset, fact.span.end)
+    span = fact.span if reading.offset is None else place
+    soft = SoftFact(fact.predicate, fact.arguments, probability, fact.unknown, reading.database, span)
+    reading.soft.append(soft)
+
+
+def _is_certain(fact: Fact) -> bool:
+    """Whether the number in front of a fact, if any, is 0 or 1."""
+    if fact.truth in (None, 0.0, 1.0):
         return True
-    if fact.truth in (0.0, 1.0):
-        return fact.truth == 1.0
-    if 0.0 < fact.truth < 1.0:
-        hint = "decide whether it is true, or leave it out; a belief can be put into the model as a weighted formula"
-        raise SyntaxMistake([mistake("E144", fact.span, hint, found=f"{fact.truth:g}")])
+    if 0.0 < (fact.truth or 0.0) < 1.0:
+        return False
     hint = "weights belong to the formulas of the model; write the fact without a number"
     raise SyntaxMistake([mistake("E148", fact.span, hint, found=f"{fact.truth:g}")])
 

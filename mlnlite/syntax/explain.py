@@ -92,7 +92,7 @@ def expectation(failure: Failure) -> str:
         said = [_term_words(failure)]
     else:
         said = [_name_word(failure)] if "NAME" in names else []
-        names = names - {"NOT", "NUMBER"} if said == ["a fact"] else names
+        names = names - {"NOT", "NUMBER", "QUESTION"} if said == ["a fact"] else names
     connectives = [sign for name, sign in _CONNECTIVES.items() if name in names]
     said += [sign for name, sign in _WORDS.items() if name in names and (name != "EQUAL" or not connectives)]
     said += [f"a connective ({', '.join(connectives)})"] if connectives else []
@@ -168,7 +168,8 @@ def _variable_mark(failure: Failure) -> Diagnostic | None:
     if not failure.found_text.startswith("?"):
         return None
     if failure.rule == "fact":
-        return _unknown_fact(failure)
+        hint = "write the name of a constant, without `?`"
+        return mistake("E146", failure.found_span, hint, found=failure.found_text)
     if failure.found_text == "?":
         return None
     if failure.language == "standard" and failure.expected & (_TERM | {"NAME"}):
@@ -177,13 +178,6 @@ def _variable_mark(failure: Failure) -> Diagnostic | None:
         words = {"actual": "prac", "asked": "standard", "found": failure.found_text, "meaning": meaning}
         return mistake("E118", failure.found_span, hint, **words)
     return None
-
-
-def _unknown_fact(failure: Failure) -> Diagnostic:
-    if "NOT" in failure.expected:
-        hint = "leave the fact out: what is not listed is unknown unless its predicate is closed"
-        return mistake("E145", failure.found_span, hint, name=failure.found_text[1:])
-    return mistake("E146", failure.found_span, "write the name of a constant, without `?`", found=failure.found_text)
 
 
 def _chain(failure: Failure) -> Diagnostic | None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _STARTS: dict[Language, tuple[str, ...]] = {
     "standard": ("standard_statement", "standard_formula", "declaration", "type_declaration", "weight"),
     "prac": ("prac_statement", "prac_formula", "declaration", "type_declaration", "weight"),
-    "evidence": ("fact", "type_declaration"),
+    "evidence": ("fact", "value", "type_declaration"),
 }
 
 

@@ -271,10 +271,31 @@ class FactTable:
 
 
 @dataclass(frozen=True, slots=True)
+class SoftFact:
+    """`0.7 P(a)`, or `?P(a)` with probability 0.5.
+
+    Attributes:
+        predicate: its name.
+        arguments: constants as text.
+        probability: of the fact, by this piece of evidence alone.
+        unknown: written `?P(a)`.
+        database: which of the databases it is in (from 0).
+    """
+
+    predicate: str
+    arguments: tuple[str, ...]
+    probability: float
+    unknown: bool
+    database: int
+    span: Span | None = _span()
+
+
+@dataclass(frozen=True, slots=True)
 class EvidenceProgram:
-    """A whole evidence file: facts, constants that it declares, and the number of its databases."""
+    """A whole evidence file: facts, constants that it declares, the number of its databases, soft facts."""
 
     facts: tuple[FactTable, ...]
     types: tuple[TypeDeclaration, ...]
     n_databases: int
+    soft: tuple[SoftFact, ...] = ()
     span: Span | None = _span()

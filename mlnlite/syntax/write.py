@@ -57,11 +57,15 @@ def write_evidence(evidence: tree.EvidenceProgram, dialect: tree.Dialect) -> str
     lines = [_type(declaration) for declaration in evidence.types]
     facts: list[list[str]] = [[] for _ in range(evidence.n_databases)]
     for table in evidence.facts:
-        words = [list(map(_constant, column)) for column in table.columns]
-        rows = zip(*words, strict=True) if words else iter([()] * len(table.truth))
+        columns = [list(map(_constant, column)) for column in table.columns]
+        rows = zip(*columns, strict=True) if columns else iter([()] * len(table.truth))
         for arguments, truth, database in zip(rows, table.truth, table.database, strict=True):
             text = f"{table.predicate}({', '.join(arguments)})" if arguments else table.predicate
             facts[database].append(text if truth else f"!{text}")
+    for soft in evidence.soft:
+        words = ", ".join(map(_constant, soft.arguments))
+        text = f"{soft.predicate}({words})" if soft.arguments else soft.predicate
+        facts[soft.database].append(f"?{text}" if soft.unknown else f"{soft.probability!r} {text}")
     for number, database_lines in enumerate(facts):
         lines += ["---"] * (number > 0) + database_lines
     # A separator that nothing follows counts only if another one follows.

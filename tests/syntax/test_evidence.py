@@ -77,8 +77,8 @@ def test_include_belongs_to_the_current_database(tmp_path):
 
 
 def test_every_mistake_is_reported():
-    text = "P(A) P(B)\nP(A)\n0.7 P(C)\n?P(D)\nP(?x)\nP(A).\n----\nP(A) v P(B)\nP(A"
-    assert codes(text) == ["E141", "E144", "E145", "E146", "E143", "E147", "E142", "E103"]
+    text = "P(A) P(B)\nP(A)\n0.7 P(C)\n?!P(D)\nP(?x)\nP(A).\n----\nP(A) v P(B)\nP(A"
+    assert codes(text) == ["E141", "E145", "E146", "E143", "E147", "E142", "E103"]
 
 
 def test_comments_do_not_hide_facts():

@@ -93,7 +93,7 @@ def test_graded_truth_is_refused_by_name(name):
     assert len(caught.value.diagnostics) == 1
 
 
-def test_soft_evidence_is_refused_by_name():
-    with pytest.raises(SyntaxMistake, match="soft evidence is not supported yet") as caught:
-        parse_evidence(read_source(DATA / "pracmln" / "taxonomies" / "dbs" / "evidence.db"), "prac")
-    assert {diagnostic.code for diagnostic in caught.value.diagnostics} == {"E144"}
+def test_soft_evidence():
+    evidence = parse_evidence(read_source(DATA / "pracmln" / "taxonomies" / "dbs" / "evidence.db"), "prac")
+    assert all(0 < fact.probability < 1 for fact in evidence.soft)
+    assert len(evidence.soft) > 0

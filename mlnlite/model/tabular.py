@@ -1,0 +1,229 @@
+"""Tables to coded columns: DuckDB reads them and numbers their constants, so that no row becomes a Python object."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean
+from mlnlite.model.bins import cut_points, numbered
+from mlnlite.model.coded import Coded, CodedTable, Int64, RowSource
+from mlnlite.model.symbols import Predicate
+from mlnlite.model.table import Table
+
+READERS = {
+    ".csv": "read_csv({}, all_varchar=true, header=true)",
+    ".tsv": "read_csv({}, all_varchar=true, header=true, delim='\t')",
+    ".parquet": "read_parquet({})",
+    ".json": "read_json_auto({})",
+    ".jsonl": "read_json_auto({}, format='newline_delimited')",
+    ".ndjson": "read_json_auto({}, format='newline_delimited')",
+}
+ROWS_AT_ONCE = 65_536
+
+
+def read_table(predicate: Predicate, table: Table) -> tuple[CodedTable, RowSource, list[Diagnostic]]:
+    """The facts of a table, the source that messages name, and warnings.
+
+    Raises:
+        EvidenceMistake: it cannot be read, or its columns do not fit the predicate.
+    """
+    source = table.source
+    name = str(source) if isinstance(source, str | Path) else f"<table {predicate.name}>"
+    with closing(duckdb.connect()) as connection:
+        try:
+            _open(connection, source)
+            return _read(connection, predicate, table, name)
+        except (duckdb.Error, sqlite3.Error, OSError) as error:
+            reason = str(error).split("\n", 1)[0]
+            raise EvidenceMistake([Diagnostic("E332", f"{name} cannot be read as a table: {reason}")]) from None
+
+
+# --- opening: afterwards there is a relation `source`
+
+
+def _open(connection: duckdb.DuckDBPyConnection, source: Any) -> None:  # noqa: ANN401
+    if not isinstance(source, str | Path):
+        columns = {k: np.asarray(v) for k, v in source.items()} if isinstance(source, dict) else source
+        connection.register("source", _objects(columns))
+        return
+    path, _, table = str(source).partition("::")
+    if not Path(path).is_file():
+        hint = did_you_mean(Path(path).name, [p.name for p in Path(path).parent.glob("*")])
+        raise EvidenceMistake([Diagnostic("E332", f"there is no file {path}", hint=hint)])
+    if table:
+        _open_database(connection, path, table)
+        return
+    reader = READERS.get(Path(path).suffix.lower())
+    if reader is None:
+        hint = f"known are {', '.join(READERS)}, and FILE::TABLE for SQLite and DuckDB"
+        raise EvidenceMistake([Diagnostic("E332", f"{path} is no kind of table that can be read", hint=hint)])
+    connection.execute(f"CREATE VIEW source AS SELECT * FROM {reader.format(_text(path))}")
+
+
+def _objects(columns: Any) -> Any:  # noqa: ANN401
+    """Text columns of NumPy as columns of objects, which is how DuckDB reads them."""
+    if not isinstance(columns, dict):
+        return columns
+    return {k: v.astype(object) if v.dtype.kind == "U" else v for k, v in columns.items()}
+
+
+def _open_database(connection: duckdb.DuckDBPyConnection, path: str, table: str) -> None:
+    with Path(path).open("rb") as file:
+        is_sqlite = file.read(15) == b"SQLite format 3"
+    if not is_sqlite:
+        connection.execute(f"ATTACH {_text(path)} AS attached (READ_ONLY)")
+        connection.execute(f"CREATE VIEW source AS SELECT * FROM attached.{_name(table)}")
+        return
+    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as database:
+        rows = database.execute(f"SELECT * FROM {_name(table)}")
+        names = [column[0] for column in rows.description]
+        connection.execute(f"CREATE TABLE source ({', '.join(f'{_name(n)} VARCHAR' for n in names)})")
+        while chunk := rows.fetchmany(ROWS_AT_ONCE):
+            columns = {str(i): np.array(c, object) for i, c in enumerate(zip(*chunk, strict=True))}
+            texts = {k: np.array([None if v is None else str(v) for v in c], object) for k, c in columns.items()}
+            connection.register("chunk", texts)
+            connection.execute("INSERT INTO source SELECT * FROM chunk")
+
+
+def _text(value: str) -> str:
+    return "'" + value.replace("'", "''") + "'"
+
+
+def _name(value: str) -> str:
+    return '"' + value.replace('"', '""') + '"'
+
+
+# --- reading
+
+
+def _read(
+    connection: duckdb.DuckDBPyConnection, predicate: Predicate, table: Table, name: str
+) -> tuple[CodedTable, RowSource, list[Diagnostic]]:
+    types = {row[0]: row[1] for row in connection.execute("DESCRIBE source").fetchall()}
+    special = {role: _special(role, table, list(types), name) for role in ("truth", "probability", "weight")}
+    arguments = _arguments(predicate, table, list(types), {c for c in special.values() if c}, name)
+    cuts = {i: cut_points(connection, c, table.bins[c], name) for i, c in enumerate(arguments) if c in table.bins}
+    parts = [numbered(_name(c), cuts[i]) if i in cuts else _as_text(c, types[c]) for i, c in enumerate(arguments)]
+    parts += [f"{_name(c)} AS {role}" for role, c in special.items() if c]
+    connection.execute(f"CREATE TEMP TABLE t AS SELECT {', '.join(_aliased(parts, len(arguments)))} FROM source")
+    columns = tuple(_coded(connection, i) for i in range(len(arguments)))
+    says, truth, soft = _truth(connection, special, name)
+    for column in columns:
+        says &= column.codes >= 0
+    rows = np.flatnonzero(says)
+    kept = tuple(Coded(c.names, c.codes[rows]) for c in columns)
+    database, softness = np.zeros(len(rows), np.int32), None if soft is None else soft[rows]
+    coded = CodedTable(predicate.name, kept, truth[rows], database, rows, softness, cuts)
+    warnings = list(_warnings(columns, arguments, len(says), rows, name))
+    return coded, RowSource(name, "", columns, predicate.name), warnings
+
+
+def _special(role: str, table: Table, names: Sequence[str], where: str) -> str | None:
+    """The column of a role: the one asked for, or the one called so."""
+    asked = getattr(table, role)
+    if asked is not None:
+        _verify_column(asked, names, where)
+        return str(asked)
+    return next((n for n in names if n.lower() == role and n not in (table.columns or ())), None)
+
+
+def _verify_column(column: str, names: Sequence[str], where: str) -> None:
+    if column not in names:
+        hint = did_you_mean(column, names) or f"it has {', '.join(names)}"
+        raise EvidenceMistake([Diagnostic("E333", f"{where} has no column {column}", hint=hint)])
+
+
+def _arguments(predicate: Predicate, table: Table, names: Sequence[str], special: set[str], where: str) -> list[str]:
+    columns = list(table.columns) if table.columns is not None else [n for n in names if n not in special]
+    for column in (*columns, *table.bins):
+        _verify_column(column, names, where)
+    if len(columns) != predicate.arity:
+        message = f"{where} has {len(columns)} columns for {predicate}, which takes {predicate.arity}"
+        hint = f"say which: a mapping file with columns = [...]; it has {', '.join(names)}"
+        raise EvidenceMistake([Diagnostic("E334", message, hint=hint)])
+    return columns
+
+
+def _as_text(column: str, kind: str) -> str:
+    """A column as text; whole numbers without `.0`."""
+    quoted = _name(column)
+    if kind in ("DOUBLE", "FLOAT"):
+        whole = f"{quoted} = trunc({quoted}) AND abs({quoted}) < 1e15"
+        text = f"CASE WHEN {whole} THEN CAST(CAST({quoted} AS BIGINT) AS VARCHAR) ELSE CAST({quoted} AS VARCHAR) END"
+        return f"CASE WHEN isnan({quoted}) THEN NULL ELSE {text} END"
+    return f"CAST({quoted} AS VARCHAR)"
+
+
+def _aliased(parts: Sequence[str], n_arguments: int) -> list[str]:
+    return [f"{part} AS c{i}" if i < n_arguments else part for i, part in enumerate(parts)] or ["1"]
+
+
+def _coded(connection: duckdb.DuckDBPyConnection, index: int) -> Coded:
+    column = f"c{index}"
+    every = f"SELECT DISTINCT {column} FROM t WHERE {column} IS NOT NULL ORDER BY 1"
+    names = connection.execute(every).fetchall()
+    if not names:
+        n_rows = connection.execute("SELECT count(*) FROM t").fetchall()[0][0]
+        return Coded([], np.full(n_rows, -1, np.int64))
+    connection.execute(f"CREATE TYPE e{index} AS ENUM ({every})")
+    code = f"CAST(coalesce(CAST(enum_code(CAST({column} AS e{index})) AS BIGINT), -1) AS BIGINT)"
+    codes = connection.execute(f"SELECT {code} AS code FROM t").fetchnumpy()["code"]
+    return Coded([row[0] for row in names], np.asarray(codes, np.int64))
+
+
+def _truth(
+    connection: duckdb.DuckDBPyConnection, special: dict[str, str | None], name: str
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64] | None]:
+    """Which rows say something, whether their fact is true, and the log-odds of soft rows."""
+    n_rows = connection.execute("SELECT count(*) FROM t").fetchall()[0][0]
+    says, truth = np.ones(n_rows, np.bool_), np.ones(n_rows, np.bool_)
+    if special["truth"]:
+        values = _numbers(connection, "CAST(CAST(truth AS BOOLEAN) AS DOUBLE)", name)
+        says, truth = ~np.isnan(values), values == 1
+    if special["probability"]:
+        values = _numbers(connection, "CAST(probability AS DOUBLE)", name)
+        return says & ~np.isnan(values), truth, _log_odds(values, name)
+    if special["weight"]:
+        values = _numbers(connection, "CAST(weight AS DOUBLE)", name)
+        return says & ~np.isnan(values), truth, values
+    return says, truth, None
+
+
+def _numbers(connection: duckdb.DuckDBPyConnection, expression: str, name: str) -> NDArray[np.float64]:
+    try:
+        found = connection.execute(f"SELECT coalesce({expression}, 'nan'::DOUBLE) AS value FROM t").fetchnumpy()
+    except duckdb.ConversionException as error:
+        reason = str(error).split("\n", 1)[0]
+        message = f"{name} has a value that is no truth or number: {reason}"
+        raise EvidenceMistake([Diagnostic("E336", message)]) from None
+    return np.asarray(found["value"], np.float64)
+
+
+def _log_odds(values: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    wrong = np.flatnonzero((values <= 0) | (values >= 1))
+    if len(wrong):
+        message = f"row {wrong[0] + 1} of {name} has the probability {values[wrong[0]]:g}"
+        hint = "soft evidence lies between 0 and 1; say what is certain in a column `truth`"
+        raise EvidenceMistake([Diagnostic("E336", message, hint=hint)])
+    return np.asarray(np.log(values) - np.log1p(-values))
+
+
+def _warnings(
+    columns: Sequence[Coded], names: Sequence[str], n_rows: int, rows: Int64, where: str
+) -> Iterator[Diagnostic]:
+    for column, name in zip(columns, names, strict=True):
+        if name in column.names:
+            message = f"the first line of {where} was taken as its header, and {name} stands below, too"
+            yield Diagnostic("W311", message, hint="a table starts with the names of its columns", severity="warning")
+    if len(rows) < n_rows:
+        message = f"{n_rows - len(rows):,} of {n_rows:,} rows of {where} have no value somewhere and say nothing"
+        hint = "an atom without a fact is unknown, unless its predicate is closed"
+        yield Diagnostic("W312", message, hint=hint, severity="warning")
