@@ -2,9 +2,12 @@
 
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).parents[1]
 HEAVY = {"numpy", "scipy", "duckdb", "lark", "numba", "networkx", "highspy", "pysat", "pytoulbar2", "rich", "pandas"}
 
 
@@ -22,3 +25,11 @@ def test_help_loads_nothing_heavy(arguments):
 
 def test_the_package_loads_nothing_heavy():
     assert imported("-c", "import mlnlite; mlnlite.MlnError") & HEAVY == set()
+
+
+def test_every_package_is_in_the_wheel():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    folders = [p.parent for top in ("mlnlite", "domains", "grammars") for p in (ROOT / top).rglob("__init__.py")]
+    names = (".".join(folder.relative_to(ROOT).parts) for folder in folders)
+    packages = {name if name.startswith("mlnlite") else f"mlnlite.{name}" for name in names}
+    assert sorted(packages) == sorted(project["tool"]["setuptools"]["packages"])
