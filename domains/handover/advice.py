@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from mlnlite import Diagnostic
 from mlnlite.domains.handover.fields import CostField, Options
 from mlnlite.domains.handover.scene import Scene
 
+UNSOLVED = "E815"
+"""The costs leave candidates, and each fails on something that only a solver can tell."""
 BLAMES = ("receiver", "kinematics", "collision")
 """What a candidate that the costs allow can fail on."""
 
@@ -90,7 +93,7 @@ def _unsolved(scene: Scene, refused: Mapping[str, int], options: Options) -> Dia
     level, robot = scene.receiver.level.name, scene.robot.name
     n = sum(refused.get(name, 0) for name in BLAMES)
     message, hint = {
-        "receiver": (f"receiver: at mobility {level} the arm reaches {{}} of {n} candidates not",
+        "receiver": (f"receiver: at mobility {level} the arm does not reach {{}} of {n} candidates",
                      "centre the voxel map on the receiver's hand, or plan with `receiver=False`"),
         "kinematics": (f"robot: {robot} has no inverse kinematics for {{}} of {n} candidates",
                        "move the robot's base, use more orientations, grasps or approaches"),
@@ -98,4 +101,9 @@ def _unsolved(scene: Scene, refused: Mapping[str, int], options: Options) -> Dia
                       "move the robot's base, enlarge the voxel map, or use more orientations"),
     }[worst]  # fmt: skip
     stopped = f" within {options.ik_calls} calls" if refused.get("calls", 0) >= options.ik_calls else ""
-    return Diagnostic("E815", message.format(refused.get(worst, 0)) + stopped, hint=hint)
+    return Diagnostic(UNSOLVED, message.format(refused.get(worst, 0)) + stopped, hint=hint)
+
+
+def with_hints(diagnostic: Diagnostic, hints: Sequence[str]) -> Diagnostic:
+    """The diagnostic with what was found out in addition."""
+    return replace(diagnostic, hint="; ".join([*hints, diagnostic.hint]))

@@ -33,6 +33,7 @@ class _Words:
     mass: float
     hand: tuple[float, float, float] | None
     catalogue: str | None
+    levels: str | None
     voxels: int
     step: float
 
@@ -48,6 +49,7 @@ _SCENE = [
     click.option("--mass", default=73.0, show_default=True, help="Body mass of the receiver [kg]."),
     click.option("--hand", type=(float, float, float), help="Position of the palm, x y z [m]."),
     click.option("--catalogue", type=click.Path(dir_okay=False), help="A TOML file of your own objects."),
+    click.option("--levels", type=click.Path(dir_okay=False), help="A TOML file of your own mobility levels."),
     click.option("--voxels", default=15, show_default=True, help="Voxels along each axis."),
     click.option("--step", default=0.03, show_default=True, help="Edge of a voxel [m]."),
 ]
@@ -66,7 +68,7 @@ def _scene(words: _Words) -> Scene:
     body = replace(receivers.Body(), height=words.height, mass=words.mass, side=words.side, posture=words.posture)
     layout = scenes.Layout(hand=words.hand, counts=(words.voxels,) * 3, step=words.step)
     thing = objects.read_object(words.thing, catalogue=words.catalogue)
-    receiver = receivers.read_receiver(words.level, body)
+    receiver = receivers.read_receiver(load("mobility").read_level(words.level, words.levels), body)
     found: Scene = scenes.make_scene(thing, words.task, receiver, words.robot, layout=layout)
     return found
 

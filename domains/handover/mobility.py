@@ -35,7 +35,13 @@ def read_levels(path: str | Path | None = None) -> tuple[MobilityLevel, ...]:
         MlnError: broken file, missing key, or a scaling outside (0, 1].
     """
     source = DATA / "levels.toml" if path is None else Path(path)
-    return tuple(_level(name, entry, f"{source.name}: [{name}]") for name, entry in read_table(source).items())
+    found = read_table(source)
+    for name, entry in found.items():
+        if not isinstance(entry, dict):
+            raise MlnError(
+                f"{source.name}: {name} = {entry!r}, expected a table", hint=f"write [{name}], its keys below"
+            )
+    return tuple(_level(name, entry, f"{source.name}: [{name}]") for name, entry in found.items())
 
 
 def _level(name: str, entry: dict[str, object], where: str) -> MobilityLevel:
@@ -46,11 +52,11 @@ def _level(name: str, entry: dict[str, object], where: str) -> MobilityLevel:
     return MobilityLevel(name, str(take(entry, "title", str, where)), **scales)
 
 
-def read_level(name: str) -> MobilityLevel:
-    """A level of the domain by name.
+def read_level(name: str, path: str | Path | None = None) -> MobilityLevel:
+    """A level by name, of a TOML file or of the domain.
 
     Raises:
         MlnError: unknown level.
     """
-    levels = {level.name: level for level in read_levels()}
+    levels = {level.name: level for level in read_levels(path)}
     return levels[choose(name, levels, "mobility level")]

@@ -12,20 +12,23 @@ the voxel.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite import Diagnostic, LimitReached, MlnError
-from mlnlite.domains.handover.advice import BLAMES, explain
+from mlnlite.domains.handover.advice import BLAMES, UNSOLVED, explain, with_hints
 from mlnlite.domains.handover.costs import appropriateness
 from mlnlite.domains.handover.feasibility import Hold, attempt, clear_turns, human_grasp
 from mlnlite.domains.handover.fields import CostField, Options, cost_field
 from mlnlite.domains.handover.grasps import GraspSet, sample_grasps
+from mlnlite.domains.handover.mobility import read_levels
 from mlnlite.domains.handover.objects import region_points
 from mlnlite.domains.handover.pose import FloatArray, Pose
+from mlnlite.domains.handover.receiver import at_level
 from mlnlite.domains.handover.scene import Scene
 
 Status = Literal["optimal", "infeasible", "limit"]
@@ -106,6 +109,14 @@ def optimise(scene: Scene, options: Options | None = None, *, exhaustive: bool =
         exhaustive: ask about every voxel instead of best-first; same answer, thousands of calls.
     """
     options = options or Options()
+    result = _run(scene, options, exhaustive)
+    if result.configuration is None and result.advice[0].code == UNSOLVED:
+        hints = [hint for hint in _relaxations(scene, options, dict(result.refused)) if hint]
+        return replace(result, advice=tuple(with_hints(entry, hints) for entry in result.advice))
+    return result
+
+
+def _run(scene: Scene, options: Options, exhaustive: bool) -> Handover:
     grasps = sample_grasps(scene.thing, scene.robot.gripper)
     case = _Case(scene, grasps, options, exhaustive, Counter())
     ranked, values = rank_grasps(scene, grasps)
@@ -120,6 +131,30 @@ def optimise(scene: Scene, options: Options | None = None, *, exhaustive: bool =
         if stopped:
             return _result(case, "limit", None, bound, explain(scene, fields, options, case.refused))
     return _result(case, "infeasible", None, float("inf"), explain(scene, fields, options, case.refused))
+
+
+def _relaxations(scene: Scene, options: Options, refused: dict[str, int]) -> Iterator[str]:
+    """What would help, tried out with the best grasp: a higher mobility, or one constraint less."""
+    brief = replace(options, grasps=1, ik_calls=min(options.ik_calls, 400))
+    if options.receiver and refused["receiver"]:
+        names = [level.name for level in read_levels()]
+        here = names.index(scene.receiver.level.name) if scene.receiver.level.name in names else 0
+        for name in reversed(names[:here]):
+            higher = _reach_of(replace(scene, receiver=at_level(scene.receiver, name)), brief)
+            if higher is not None:
+                yield f"at mobility {name} there is an answer with C_R {higher:.3f} m"
+                break
+    for words, used, without in (
+        ("without regard to the receiver's arm", options.receiver, replace(brief, receiver=False)),
+        ("without regard to collisions", options.collisions, replace(brief, collisions=False)),
+    ):
+        found = _reach_of(scene, without) if used else None
+        yield f"{words} there is an answer with C_R {found:.3f} m" if found is not None else ""
+
+
+def _reach_of(scene: Scene, options: Options) -> float | None:
+    found = _run(scene, options, False).configuration
+    return None if found is None else found.reach
 
 
 def rank_grasps(scene: Scene, grasps: GraspSet) -> tuple[NDArray[np.int64], FloatArray]:

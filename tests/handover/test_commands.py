@@ -58,6 +58,14 @@ def test_mistakes_are_told_and_end_with_two(words, said):
     assert "hint" in found.output
 
 
+def test_levels_of_your_own_from_a_file(tmp_path):
+    (tmp_path / "levels.toml").write_text('[frail]\ntitle = "frail"\nrange = 0.3\nstrength = 0.2\ntrunk = 0.1\n')
+    found = _run("optimise", "--level", "frail", "--levels", str(tmp_path / "levels.toml"))
+    assert "mobility frail" in found.output
+    (tmp_path / "levels.toml").write_text("frail = 3\n")
+    assert "expected a table" in _run("optimise", "--level", "frail", "--levels", str(tmp_path / "levels.toml")).output
+
+
 def test_mistakes_are_data_for_programs():
     found = _run("optimise", "--object", "mugg", "--format", "json")
     assert json.loads(found.output)["diagnostics"][0]["hint"] == "did you mean mug?"
@@ -107,3 +115,16 @@ def test_public_names_survive_the_import_of_their_modules():
     for home, names in package._HOMES.items():
         package.load(home)
         assert home not in names.split(), "a module would hide the name"
+
+
+def test_the_domain_uses_the_front_door_only():
+    import ast
+    from pathlib import Path
+
+    for file in Path(package.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "mlnlite":
+                assert node.module == "mlnlite" or node.module.startswith("mlnlite.domains.handover"), (
+                    file,
+                    node.module,
+                )

@@ -184,6 +184,13 @@ def test_a_robot_by_path_is_the_robot_by_name(tmp_path):
     assert np.array_equal(ours.chain.table, copy.chain.table)
 
 
+def test_a_robot_by_path_hands_over(tmp_path):
+    ours = read_robot("panda")
+    robot = read_robot(str(_panda(tmp_path)), tool="panda_grasp", base=ours.base("standing"), gripper=ours.gripper)
+    found = require(optimise(make_scene("marker", "to_write", robot=robot)))
+    assert np.array_equal(found.hold.q, require(optimise(make_scene("marker", "to_write", robot=ours))).hold.q)
+
+
 def test_levels_of_your_own(tmp_path):
     path = tmp_path / "levels.toml"
     path.write_text('[frail]\ntitle = "frail"\nrange = 0.3\nstrength = 0.1\ntrunk = 0.1\n')

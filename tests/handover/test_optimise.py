@@ -144,7 +144,7 @@ def test_the_limit_of_calls_is_a_status_with_a_bound():
         (Layout(centre=np.array([1.6, -0.2, 1.1])), Options(), "E812", "allow a reach of"),
         (Layout(base=pose_at(4.0, 0, 0, np.pi)), Options(), "E813", "move the base of the robot 2."),
         (Layout(), Options(limits=Limits(safety=0.25, reach=0.1)), "E814", "asks for a reach of"),
-        (Layout(counts=(3, 3, 3), step=0.035), Options(), "E815", "cannot stay apart"),
+        (Layout(counts=(3, 3, 3), step=0.035), Options(), "E815", "without regard to collisions there is"),
     ],
 )
 def test_infeasible_scenes_say_why_and_what_would_help(layout, options, code, words):
@@ -169,7 +169,9 @@ def test_a_receiver_out_of_reach_is_named():
     layout = Layout(centre=np.array([0.75, 0.25, 1.45]), counts=(5, 5, 5), step=0.02)
     result = optimise(make_scene("mug", receiver="L", layout=layout))
     assert result.status == "infeasible"
-    assert "mobility L" in str(result.advice[0])
+    assert "mobility L " in str(result.advice[0])
+    assert "at mobility H-M there is an answer" in result.advice[0].hint
+    assert optimise(make_scene("mug", receiver="H-M", layout=layout)).configuration is not None
 
 
 def test_methods_order_in_effort_and_reach():
