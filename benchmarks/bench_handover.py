@@ -16,9 +16,9 @@ import numpy as np
 
 from mlnlite.domains.handover.grasps import sample_grasps
 from mlnlite.domains.handover.objects import object_names, read_object
-from mlnlite.domains.handover.optimise import optimise
 from mlnlite.domains.handover.receiver import Body, read_receiver
 from mlnlite.domains.handover.scene import Layout, make_scene
+from mlnlite.domains.handover.search import optimise
 
 LEVELS = ("H", "H-M", "L-M", "L")
 ROBOTS = ("pr2", "panda")
