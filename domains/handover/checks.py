@@ -102,6 +102,12 @@ def _least_distance(scene: Scene, grasps: GraspSet, found: Configuration, option
     return float(min(parts.to_hand[0, 0], parts.to_face[0, 0], parts.gripper_to_hand[0, 0]))
 
 
+def _reach_distance(scene: Scene, grasps: GraspSet, found: Configuration, options: Options) -> float:
+    points = cost_points(scene, grasps.centres[found.grasp])
+    at = found.thing.position[None], found.thing.rotation[None, None]
+    return float(distances(points, *at, options.distance).to_grasp[0, 0])
+
+
 def _in_object(grasps: GraspSet, found: Configuration) -> Pose:
     return Pose(grasps.centres[found.grasp], grasps.rotations[found.grasp, found.hold.approach], "object")
 
@@ -122,10 +128,7 @@ def violations(scene: Scene, found: Configuration, options: Options | None = Non
         out.append("the tool is not turned as the grasp")
     if _least_distance(scene, grasps, found, options) < options.limits.safety:
         out.append("hand or face is too near")
-    if (
-        float(np.linalg.norm(found.human_grasp - scene.hand.position)) > options.limits.reach
-        and options.distance == "point"
-    ):
+    if _reach_distance(scene, grasps, found, options) > options.limits.reach + 1e-9:
         out.append("the hand would move too far")
     if options.receiver and not can_reach(scene.receiver, found.human_grasp):
         out.append("the receiver cannot reach it")

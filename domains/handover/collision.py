@@ -32,7 +32,7 @@ class Bodies:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class World:
-    """Three views of one scene, from cheap to dear.
+    """Three views of one scene, from cheap to dear. Its buffers serve one thread at a time.
 
     Attributes:
         robot: whose arm moves.
