@@ -27,6 +27,8 @@ class _Words:
     task: str
     level: str
     robot: str
+    tool: str
+    base: tuple[float, float, float, float] | None
     posture: str
     side: str
     height: float
@@ -43,6 +45,8 @@ _SCENE = [
     click.option("--task", default="to_hand_over", show_default=True, help="What the receiver will do with it."),
     click.option("--level", default="H", show_default=True, help="Arm mobility: H, H-M, L-M, L."),
     click.option("--robot", default="pr2", show_default=True, help="pr2, panda, or the path of a URDF."),
+    click.option("--tool", default="", help="Frame of the grasp centre in a URDF of your own; by default its last."),
+    click.option("--base", type=(float, float, float, float), help="The robot's base: x y z [m], heading [rad]."),
     click.option("--posture", default="standing", show_default=True, help="standing or seated."),
     click.option("--side", default="right", show_default=True, help="The hand that takes: right or left."),
     click.option("--height", default=1.74, show_default=True, help="Stature of the receiver [m]."),
@@ -66,10 +70,12 @@ def _scene(words: _Words) -> Scene:
 
     scenes, receivers, objects = load("scene"), load("receiver"), load("objects")
     body = replace(receivers.Body(), height=words.height, mass=words.mass, side=words.side, posture=words.posture)
-    layout = scenes.Layout(hand=words.hand, counts=(words.voxels,) * 3, step=words.step)
+    base = load("pose").pose_at(*words.base) if words.base else None
+    layout = scenes.Layout(words.hand, base, (words.voxels,) * 3, words.step)
     thing = objects.read_object(words.thing, catalogue=words.catalogue)
     receiver = receivers.read_receiver(load("mobility").read_level(words.level, words.levels), body)
-    found: Scene = scenes.make_scene(thing, words.task, receiver, words.robot, layout=layout)
+    robot = load("robots").read_robot(words.robot, tool=words.tool)
+    found: Scene = scenes.make_scene(thing, words.task, receiver, robot, layout=layout)
     return found
 
 

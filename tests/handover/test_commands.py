@@ -66,6 +66,26 @@ def test_levels_of_your_own_from_a_file(tmp_path):
     assert "expected a table" in _run("optimise", "--level", "frail", "--levels", str(tmp_path / "levels.toml")).output
 
 
+def test_a_robot_by_path_with_its_place(tmp_path):
+    text = (package.load("tables").DATA / "panda.urdf").read_text()
+    (tmp_path / "mine.urdf").write_text(text)
+    words = (
+        "--robot",
+        str(tmp_path / "mine.urdf"),
+        "--tool",
+        "panda_grasp",
+        "--base",
+        "1.02",
+        "-0.2",
+        "0.72",
+        "3.1416",
+    )
+    found = _run("optimise", "--object", "marker", *words)
+    assert "by mine, method ours: optimal" in found.output
+    far = _run("optimise", "--object", "marker", *words[:4], "--base", "5", "0", "0", "3.1416")
+    assert "move the base of the robot" in far.output
+
+
 def test_mistakes_are_data_for_programs():
     found = _run("optimise", "--object", "mugg", "--format", "json")
     assert json.loads(found.output)["diagnostics"][0]["hint"] == "did you mean mug?"

@@ -162,6 +162,12 @@ def test_what_a_user_can_get_wrong_is_told_with_a_cure(act, words):
     [
         ("<robot", "arm.urdf:1:"),
         ("<robot name='x'><link name='a'/></robot>", "no moving joint"),
+        (
+            "<robot name='x'><link name='a'/><link name='b'><collision><geometry><mesh filename='package://p/b.stl'/>"
+            "</geometry></collision></link><joint name='j' type='revolute'><parent link='a'/><child link='b'/>"
+            "<axis xyz='0 0 1'/><limit lower='0' upper='1' effort='1' velocity='1'/></joint></robot>",
+            "for meshes give their folder",
+        ),
         ("<robot name='x'><link name='a'/><joint name='j' type='revolute'><parent link='a'/></joint></robot>", "URDF"),
     ],
 )
