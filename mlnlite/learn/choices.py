@@ -98,7 +98,7 @@ def _binary(predicate: Predicate, found: Entries, evidence: Evidence, n_weights:
     matrix = sparse.csr_array((data, found.weight, np.append(starts, len(key))), shape=(len(starts), n_weights))
     world = found.database[starts]
     n, constant = _untouched(predicate, world, np.full(evidence.n_databases, 2), evidence)
-    return Listed(matrix, np.ones(len(starts)), np.arange(len(starts)), world, n, constant)
+    return Listed(matrix, np.ones(len(starts)), np.arange(len(starts)), world, found.atom[starts], n, constant)
 
 
 def _blocks(predicate: Predicate, found: Entries, evidence: Evidence, n_weights: int) -> Listed:
@@ -112,7 +112,7 @@ def _blocks(predicate: Predicate, found: Entries, evidence: Evidence, n_weights:
         shape=(len(option_key), n_weights),
     )
     first, value = _split(predicate, option_key, evidence)
-    blocks, block = np.unique(first, return_inverse=True)
+    blocks, at, block = np.unique(first, return_index=True, return_inverse=True)
     world = blocks // _n_atoms(predicate, evidence)
     of_true = value == _true_values(predicate, blocks, evidence)[block]
     own = np.full(len(blocks), len(option_key))
@@ -126,7 +126,8 @@ def _blocks(predicate: Predicate, found: Entries, evidence: Evidence, n_weights:
     times = np.concatenate([np.ones(len(others)), n_silent[silent].astype(float)])
     order = np.argsort(choice, kind="stable")
     n, constant = _untouched(predicate, world, n_values, evidence)
-    return Listed(sparse.csr_array(matrix[order]), times[order], choice[order], world, n, constant)
+    unit = option_key[at] % _n_atoms(predicate, evidence) + evidence.first_atom()[predicate.name]
+    return Listed(sparse.csr_array(matrix[order]), times[order], choice[order], world, unit, n, constant)
 
 
 def _split(predicate: Predicate, key: Int64, evidence: Evidence) -> tuple[Int64, Int64]:

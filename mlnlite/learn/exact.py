@@ -91,7 +91,7 @@ def compiled(
     for i in range(databases.n_databases):
         data = one_database(databases, i)
         data = closed(data, [n for n in _closable(data) if n not in targets | unknown])
-        network = ground(model, _hidden(data, targets), engine=engine)
+        network = ground(model, conditions(databases, i, targets, unknown), engine=engine)
         values = _values(network, data, targets - unknown)
         parts = pairs(network) if objective == "composite" else components(network)
         if all(n_worlds(network, p) <= MOST_WORLDS for p in parts):
@@ -100,9 +100,15 @@ def compiled(
             found.known.append(worlds.known)
         else:
             found.wide.append(Wide(network, _clamped(model, data, network, values, targets - unknown), i))
-        n, log_likelihood = _untouched(network, data, targets, unknown)
+        n, log_likelihood = _untouched(network, values, data, (targets, unknown))
         constant, n_choices = constant + log_likelihood, n_choices + n
     return replace(found, constant=constant, n_choices=n_choices)
+
+
+def conditions(databases: Evidence, index: int, targets: frozenset[str], unknown: frozenset[str]) -> Evidence:
+    """One database without what is predicted; the world of the other predicates is closed, but of the unknown ones."""
+    data = one_database(databases, index)
+    return _hidden(closed(data, _closable(data) - targets - unknown), targets)
 
 
 def _closable(data: Evidence) -> frozenset[str]:
@@ -163,11 +169,14 @@ def _verify_values(network: Network, data: Evidence, values: Int64, complete: fr
             raise EvidenceMistake([Diagnostic("E320", message, predicate.span, hint)])
 
 
-def _untouched(network: Network, data: Evidence, targets: frozenset[str], unknown: frozenset[str]) -> tuple[int, float]:
+def _untouched(
+    network: Network, values: Int64, data: Evidence, names: tuple[frozenset[str], frozenset[str]]
+) -> tuple[int, float]:
     """Number of known atoms and blocks of the targets, and the log-likelihood of those that no formula touches."""
-    names, first = list(data.predicates), np.array(list(data.first_atom().values()))
+    targets, unknown = names
+    order, first = list(data.predicates), np.array(list(data.first_atom().values()))
     leader = np.unique(network.variable, return_index=True)[1]
-    inside = np.searchsorted(first, network.atoms[leader], "right") - 1
+    inside = np.searchsorted(first, network.atoms[leader][values >= 0], "right") - 1
     n_choices, total = 0, 0.0
     for name in targets:
         predicate = data.predicates[name]
@@ -176,7 +185,7 @@ def _untouched(network: Network, data: Evidence, targets: frozenset[str], unknow
             facts = data.facts[name]
             n_units = len(facts.truth) if predicate.value is None else int(facts.truth.sum())
         n_choices += n_units
-        left = max(0, n_units - int(np.count_nonzero(inside == names.index(name))))
+        left = max(0, n_units - int(np.count_nonzero(inside == order.index(name))))
         total -= left * float(np.log(max(n_values, 1)))
     return n_choices, total
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,19 @@ from numpy.typing import NDArray
 from mlnlite.learn.prior import Penalty, Prior, prior_data, prior_text
 from mlnlite.learn.problem import Problem
 from mlnlite.model.model import Model
+
+Objective: TypeAlias = Literal["pseudo-likelihood", "likelihood", "composite"]
+"""What is maximised: the product over atoms of their probability given all else; the probability of all predicted
+atoms together; or the product over pairs of atoms that share a formula."""
+
+
+@dataclass(frozen=True, slots=True)
+class How:
+    """What was asked of `learn`: the objective, what is predicted (None: all) and what is unknown unless a fact."""
+
+    objective: Objective = "pseudo-likelihood"
+    predict: tuple[str, ...] | None = None
+    open_predicates: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +46,7 @@ class LearnedModel:
         iterations: steps of the search.
         seconds: time spent by stage.
         history: objective and log prior at the start and after each step.
+        how: what was asked.
         problem: what was solved, for what is asked of the weights afterwards.
         penalty: of each weight, with what was learnt of the prior put in.
     """
@@ -49,6 +64,7 @@ class LearnedModel:
     iterations: int
     seconds: Mapping[str, float]
     history: tuple[float, ...] = field(repr=False)
+    how: How
     problem: Problem = field(repr=False, compare=False)
     penalty: Penalty = field(repr=False, compare=False)
 

@@ -49,6 +49,7 @@ class Listed:
         times: shape (n_rows,), how many alternatives look like this.
         choice: shape (n_rows,), rising.
         database: shape (n_touched,), of each choice.
+        unit: shape (n_touched,), number of an atom of each choice; where worlds are listed, number of the part.
         n_choices: number of choices, those included that no formula touches.
         constant: log-likelihood of the latter.
     """
@@ -57,26 +58,27 @@ class Listed:
     times: Float
     choice: Int64
     database: Int64
+    unit: Int64
     n_choices: int
     constant: float
 
 
-def merged(parts: Sequence[Listed], n_weights: int, group: Int64 | None = None) -> Choices:
+def merged(parts: Sequence[Listed], n_weights: int, groups: Sequence[Int64] | None = None) -> Choices:
     """Choices, equal ones once.
 
     Args:
         parts: what was listed.
         n_weights: number of weights.
-        group: shape (n_databases,), cluster of each database: only choices of one cluster are merged. None: one.
+        groups: for each part the cluster of each choice: only choices of one cluster are merged. None: all are of one.
     """
     n_touched = np.cumsum([0, *(len(p.database) for p in parts)])
     rows = sparse.csr_array(sparse.vstack([p.rows for p in parts])) if parts else sparse.csr_array((0, n_weights))
     times = np.concatenate([np.empty(0), *(p.times for p in parts)])
     shifted = (p.choice + n for p, n in zip(parts, n_touched, strict=False))
     choice = np.concatenate([np.empty(0, np.int64), *shifted])
-    database = np.concatenate([np.empty(0, np.int64), *(p.database for p in parts)])
     n_choices, constant = sum(p.n_choices for p in parts), sum(p.constant for p in parts)
-    of_choice = np.zeros(len(database), np.int64) if group is None else group[database]
+    clusters = [np.zeros(len(p.database), np.int64) for p in parts] if groups is None else groups
+    of_choice = np.concatenate([np.empty(0, np.int64), *clusters])
     rows, times, choice, key = _equal_rows(rows, times, choice)
     firsts = np.flatnonzero(np.diff(choice, prepend=-1))
     n_rows = np.diff(np.append(firsts, len(choice)))
@@ -85,9 +87,9 @@ def merged(parts: Sequence[Listed], n_weights: int, group: Int64 | None = None) 
     number[kept] = np.arange(len(kept))
     of_row = np.repeat(number, n_rows)
     keep = np.flatnonzero(of_row >= 0)
-    groups = of_choice[choice[firsts[kept]]]
+    cluster = of_choice[choice[firsts[kept]]]
     log_times = np.log(times[keep])
-    return Choices(sparse.csr_array(rows[keep]), log_times, of_row[keep], many, n_choices, constant, groups)
+    return Choices(sparse.csr_array(rows[keep]), log_times, of_row[keep], many, n_choices, constant, cluster)
 
 
 def _equal_rows(rows: sparse.csr_array, times: Float, choice: Int64) -> tuple[sparse.csr_array, Float, Int64, UInt64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from time import monotonic
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from mlnlite.ground.tables import tables_of
 from mlnlite.learn.choices import listed
 from mlnlite.learn.counts import entries
 from mlnlite.learn.exact import compiled
-from mlnlite.learn.learned import LearnedModel
+from mlnlite.learn.learned import How, LearnedModel, Objective
 from mlnlite.learn.merge import Listed, merged
 from mlnlite.learn.prior import PRIOR_SD, Hierarchical, Prior, penalty_of, prior_of, prior_of_each
 from mlnlite.learn.problem import Problem, log_likelihood, problem_of
@@ -26,10 +26,6 @@ from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Type
-
-Objective: TypeAlias = Literal["pseudo-likelihood", "likelihood", "composite"]
-"""What is maximised: the product over atoms of their probability given all else; the probability of all predicted
-atoms together; or the product over pairs of atoms that share a formula."""
 
 
 def learn(
@@ -70,7 +66,7 @@ def learn(
     """
     deadline = None if time_limit is None else monotonic() + time_limit
     prior, start = prior_of(prior), monotonic()
-    targets, unknown = _names(model, predict, "predict"), _names(model, open_predicates, "leave open")
+    targets, unknown = _names(model, predict, "predict"), _names(model, frozenset(open_predicates), "leave open")
     _verify(objective, unknown)
     model = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
     if objective == "pseudo-likelihood":
@@ -81,7 +77,8 @@ def learn(
     solution = _solved(model, found, prior, deadline)
     seconds = {"count": counted - start, "solve": monotonic() - counted}
     learned = _learned(replace(model, types=_types(model, databases)), found, solution, seconds)
-    return replace(learned, prior=prior, objective=_title(objective, predict is not None))
+    how = How(objective, None if predict is None else tuple(sorted(targets)), tuple(sorted(unknown)))
+    return replace(learned, prior=prior, objective=_title(objective, predict is not None), how=how)
 
 
 def _title(objective: Objective, conditional: bool) -> str:
@@ -131,6 +128,12 @@ def pseudo_problem(model: Model, databases: Evidence, targets: frozenset[str], e
     return problem_of(model, merged(pseudo_listed(model, databases, targets, engine), n_weights))
 
 
+def without_weights(model: Model) -> Model:
+    """The model with all weights 0 that are learnt."""
+    zero = (t if t.hard or t.fixed else replace(t, weights=np.zeros(len(t.weights))) for t in model.templates)
+    return replace(model, templates=tuple(zero))
+
+
 def _exact_problem(
     model: Model,
     databases: Evidence,
@@ -140,8 +143,7 @@ def _exact_problem(
     engine: Engine | None,
 ) -> Problem:
     n_weights = sum(len(t.weights) for t in model.templates)
-    zero = tuple(t if t.hard or t.fixed else replace(t, weights=np.zeros(len(t.weights))) for t in model.templates)
-    found = compiled(replace(model, templates=zero), databases, targets, unknown, objective, engine)
+    found = compiled(without_weights(model), databases, targets, unknown, objective, engine)
     every = merged(found.every, n_weights)
     every = replace(every, constant=every.constant + found.constant, n_choices=found.n_choices)
     return problem_of(model, every, merged(found.known, n_weights), tuple(found.wide))
@@ -178,6 +180,7 @@ def _learned(model: Model, problem: Problem, solution: Solution, seconds: dict[s
         iterations=optimum.iterations,
         seconds=seconds,
         history=optimum.history,
+        how=How(),
         problem=problem,
         penalty=solution.penalty,
     )

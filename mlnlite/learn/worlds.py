@@ -95,56 +95,84 @@ def list_worlds(network: Network, values: Int64, parts: Sequence[Int64], databas
         database: number of the database.
     """
     touching = incidence(network)
-    tables = [_counts(network, values, part, touching) for part in parts]
-    rows: tuple[list[sparse.csr_array], list[sparse.csr_array]] = ([], [])
-    lengths: tuple[list[int], list[int]] = ([], [])
-    for part, (grid, counts) in zip(parts, tables, strict=True):
-        known = values[part] >= 0
-        agrees = (grid[:, known] == values[part][known]).all(axis=1)
-        reference = _reference(network, counts, np.flatnonzero(agrees))
-        others = np.arange(len(grid)) != reference
-        for i, chosen in enumerate((others, others & agrees)):
-            rows[i].append(sparse.csr_array(counts[[reference] * int(chosen.sum())] - counts[np.flatnonzero(chosen)]))
-            lengths[i].append(int(chosen.sum()))
-    every, known_part = (_listed(r, n, len(network.weights), database) for r, n in zip(rows, lengths, strict=True))
-    return Worlds(every, known_part)
+    hard = np.isposinf(network.weights)
+    every, known = _Rows([], []), _Rows([], [])
+    for part in parts:
+        table = _table(network, values, part, touching)
+        given = values[part] >= 0
+        agrees = (table.grid[:, given] == values[part][given]).all(axis=1)
+        fits = np.flatnonzero(agrees)
+        reference = int(fits[table.counts[fits][:, hard[table.weights]].sum(axis=1).argmax()])
+        others = np.arange(len(agrees)) != reference
+        change = table.counts[reference] - table.counts
+        for rows, chosen in ((every, others), (known, others & agrees)):
+            rows.columns.append(table.weights)
+            rows.change.append(change[chosen])
+    return Worlds(*(_listed(rows, len(network.weights), database) for rows in (every, known)))
 
 
-def _reference(network: Network, counts: sparse.csr_array, agrees: Int64) -> int:
-    """A world that agrees with the data and, if there is one, satisfies the hard formulas."""
-    hard = np.flatnonzero(np.isposinf(network.weights))
-    return int(agrees[np.asarray(counts[agrees][:, hard].sum(axis=1)).argmax()]) if len(hard) else int(agrees[0])
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Rows of each part: which weights, and their changes, shape (n_rows, n_weights of the part)."""
+
+    columns: list[Int64]
+    change: list[Float]
 
 
-def _listed(rows: list[sparse.csr_array], lengths: list[int], n_weights: int, database: int) -> Listed:
-    matrix = sparse.csr_array(sparse.vstack(rows)) if rows else sparse.csr_array((0, n_weights))
+def _listed(rows: _Rows, n_weights: int, database: int) -> Listed:
+    lengths = np.array([len(c) for c in rows.change], np.int64)
+    widths = np.array([len(c) for c in rows.columns], np.int64)
+    data = np.concatenate([np.empty(0), *(c.ravel() for c in rows.change)])
+    columns = np.concatenate(
+        [np.empty(0, np.int64), *(np.tile(c, n) for c, n in zip(rows.columns, lengths.tolist(), strict=True))]
+    )
+    pointer = np.concatenate([[0], np.cumsum(np.repeat(widths, lengths))])
+    matrix = sparse.csr_array((data, columns, pointer), shape=(int(lengths.sum()), n_weights))
     matrix.eliminate_zeros()
-    matrix.sort_indices()
-    filled = [n for n in lengths if n]
-    choice = np.repeat(np.arange(len(filled)), filled)
-    return Listed(matrix, np.ones(len(choice)), choice, np.full(len(filled), database), len(lengths), 0.0)
+    filled = np.flatnonzero(lengths)
+    choice = np.repeat(np.arange(len(filled)), lengths[filled])
+    world = np.full(len(filled), database)
+    return Listed(matrix, np.ones(len(choice)), choice, world, filled.astype(np.int64), len(lengths), 0.0)
 
 
-def _counts(network: Network, values: Int64, part: Int64, touching: sparse.csr_array) -> tuple[Int64, sparse.csr_array]:
-    """The worlds of a part, shape (n_worlds, n_variables of it), and their counts, shape (n_worlds, n_weights)."""
-    cardinality = network.cardinality[part].tolist()
-    grid = np.indices(cardinality).reshape(len(part), -1).T
+def world_counts(network: Network, part: Int64) -> WorldTable:
+    """The worlds of a component."""
+    return _table(network, np.zeros(network.n_variables, np.int64), part, incidence(network))
+
+
+@dataclass(frozen=True, slots=True)
+class WorldTable:
+    """The worlds of a part.
+
+    Attributes:
+        grid: shape (n_worlds, n_variables of the part), values of its variables.
+        weights: shape (k,), the weights that some formula of the part has, rising.
+        counts: shape (n_worlds, k), number of their groundings that are true and touch the part.
+    """
+
+    grid: Int64
+    weights: Int64
+    counts: Float
+
+
+def _table(network: Network, values: Int64, part: Int64, touching: sparse.csr_array) -> WorldTable:
+    grid = np.indices(network.cardinality[part].tolist()).reshape(len(part), -1).T
     place = np.full(network.n_variables, -1)
     place[part] = np.arange(len(part))
-    factors = np.unique(touching[part].indices)
-    total = sparse.csr_array((len(grid), len(network.weights)), dtype=float)
-    first = 0
+    slices = [touching.indices[touching.indptr[v] : touching.indptr[v + 1]] for v in part.tolist()]
+    factors = np.unique(np.concatenate(slices)).astype(np.int64) if slices else np.empty(0, np.int64)
+    weight, counts, first = [np.empty(0, np.int64)], [np.empty((len(grid), 0))], 0
     groups: tuple[Clauses | Tables | Counts, ...] = (*network.clauses, *network.tables, *network.counts)
     for group in groups:
         n = len(group.weight)
-        chosen = factors[(factors >= first) & (factors < first + n)] - first
+        begin, end = np.searchsorted(factors, [first, first + n]).tolist()
+        chosen = factors[begin:end] - first
         first += n
         if len(chosen):
-            n_true = _n_true(network, values, group, chosen.astype(np.int64), (grid, place))
-            world, which = np.nonzero(n_true)
-            data = (group.count[chosen] * n_true)[world, which].astype(float)
-            total = total + sparse.csr_array((data, (world, group.weight[chosen][which])), shape=total.shape)
-    return grid, sparse.csr_array(total)
+            counts.append(group.count[chosen] * _n_true(network, values, group, chosen, (grid, place)).astype(float))
+            weight.append(group.weight[chosen].astype(np.int64))
+    weights, which = np.unique(np.concatenate(weight), return_inverse=True)
+    return WorldTable(grid, weights, np.concatenate(counts, axis=1) @ np.eye(len(weights))[which.reshape(-1)])
 
 
 def _n_true(

@@ -1,0 +1,53 @@
+"""Choices at some weights to matrices: how sharp the likelihood is, and what each cluster of the data says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from mlnlite.learn import likelihood
+from mlnlite.learn.merge import Choices
+
+Float = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+
+def expected_rows(choices: Choices, x: Float) -> sparse.csr_array:
+    """What each choice adds to the gradient, shape (n_choices, n_weights)."""
+    point = likelihood.at(choices, x)
+    n_rows = len(choices.choice)
+    shape = (len(choices.many), n_rows)
+    chance = sparse.csr_array((point.chance, (choices.choice, np.arange(n_rows))), shape=shape)
+    return sparse.csr_array(chance @ choices.rows)
+
+
+def hessian(choices: Choices, x: Float) -> sparse.csr_array:
+    """Minus the Hessian of the log-likelihood, shape (n_weights, n_weights)."""
+    point, mean = likelihood.at(choices, x), expected_rows(choices, x)
+    weight = choices.many[choices.choice] * point.chance
+    second = choices.rows.T @ sparse.diags_array(weight) @ choices.rows
+    return sparse.csr_array(second - mean.T @ sparse.diags_array(choices.many) @ mean)
+
+
+def scores(choices: Choices, x: Float) -> sparse.csr_array:
+    """Gradient of each cluster, shape (n_clusters, n_weights); clusters without a choice are left out."""
+    clusters, cluster = np.unique(choices.group, return_inverse=True)
+    n = len(choices.many)
+    gather = sparse.csr_array((choices.many, (cluster.reshape(-1), np.arange(n))), shape=(len(clusters), n))
+    return sparse.csr_array(gather @ expected_rows(choices, x))
+
+
+def blocks(matrix: sparse.csr_array) -> Iterator[Int64]:
+    """Weights that hang together: the connected components of a symmetric matrix."""
+    n, label = connected_components(matrix, directed=False)
+    order = np.argsort(label, kind="stable").astype(np.int64)
+    yield from np.split(order, np.cumsum(np.bincount(label, minlength=n))[:-1])
+
+
+def dense(matrix: sparse.csr_array, rows: Int64) -> Float:
+    """A square part of a matrix."""
+    return np.asarray(matrix[rows][:, rows].todense(), float)
