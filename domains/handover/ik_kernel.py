@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from mlnlite.domains.handover.compiled import kernel
 from mlnlite.domains.handover.pose import FloatArray
 
 
-@njit(cache=True)
+@kernel
 def forward(table: FloatArray, q: FloatArray, frames: FloatArray) -> None:
     """Writes the joint frames after their motion to `frames[:n]` and the tool's to `frames[n]`, each 3x4 [m]."""
     n = len(q)
@@ -46,7 +46,7 @@ def forward(table: FloatArray, q: FloatArray, frames: FloatArray) -> None:
         frames[i, :, 3] = p
 
 
-@njit(cache=True)
+@kernel
 def pose_error(now: FloatArray, target: FloatArray, error: FloatArray) -> tuple[float, float]:
     """Writes position error [m] and rotation vector [rad] from `now` to `target`; returns their norms."""
     e = np.empty((3, 3))
@@ -62,7 +62,7 @@ def pose_error(now: FloatArray, target: FloatArray, error: FloatArray) -> tuple[
     return np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2), angle
 
 
-@njit(cache=True)
+@kernel
 def jacobian(table: FloatArray, frames: FloatArray, weight: float, out: FloatArray) -> None:
     """Writes the Jacobian of the tool (6 x n): linear rows [m], angular rows times `weight` [m/rad]."""
     n = out.shape[1]
@@ -80,7 +80,7 @@ def jacobian(table: FloatArray, frames: FloatArray, weight: float, out: FloatArr
         out[3, i], out[4, i], out[5, i] = weight * ax, weight * ay, weight * az
 
 
-@njit(cache=True)
+@kernel
 def damped_step(j: FloatArray, error: FloatArray, damping: float, step: FloatArray) -> None:
     """Writes `J^T (J J^T + damping I)^-1 error` by Cholesky factors of the 6x6 matrix."""
     factor, y = np.zeros((6, 6)), np.zeros(6)
@@ -109,7 +109,7 @@ def damped_step(j: FloatArray, error: FloatArray, damping: float, step: FloatArr
         step[i] = total
 
 
-@njit(cache=True)
+@kernel
 def solve(table: FloatArray, target: FloatArray, starts: FloatArray, settings: FloatArray) -> tuple[Any, int, int]:
     """First start that ends within the tolerances, in order.
 

@@ -6,13 +6,13 @@ A cheap first test: it never reports a collision that is none, and what it lets 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mlnlite.domains.handover.compiled import kernel
 from mlnlite.domains.handover.pose import FloatArray
 
 
-@njit(cache=True)
+@kernel
 def touches(points: FloatArray, rotation: FloatArray, position: FloatArray, capsules: FloatArray) -> bool:
     """Whether a point of the body lies in a capsule.
 
@@ -40,7 +40,7 @@ def touches(points: FloatArray, rotation: FloatArray, position: FloatArray, caps
     return False
 
 
-@njit(cache=True)
+@kernel
 def touching_turns(
     points: FloatArray, rotations: FloatArray, position: FloatArray, capsules: FloatArray
 ) -> NDArray[np.bool_]:
@@ -51,7 +51,7 @@ def touching_turns(
     return out
 
 
-@njit(cache=True)
+@kernel
 def _squared(capsule: FloatArray, x: float, y: float, z: float) -> float:
     """Squared distance of a point to the axis of a capsule [m^2]."""
     ux, uy, uz = capsule[3] - capsule[0], capsule[4] - capsule[1], capsule[5] - capsule[2]

@@ -187,3 +187,18 @@ def test_pink_reaches_the_same_poses_another_way():
             assert np.linalg.norm(reached[:3, 3] - target[:3, 3]) <= 1e-3
             assert (robot.chain.lower - 1e-9 <= solution.q).all()
             assert (solution.q <= robot.chain.upper + 1e-9).all()
+
+
+def test_machine_code_finds_a_place_where_nothing_can_be_written(monkeypatch, tmp_path):
+    import os
+
+    from mlnlite.domains.handover.compiled import prepare_cache
+
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    prepare_cache(tmp_path / "__pycache__")
+    assert "NUMBA_CACHE_DIR" not in os.environ
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    prepare_cache(tmp_path / "__pycache__")
+    assert "mlnlite-" in os.environ["NUMBA_CACHE_DIR"]

@@ -3,6 +3,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from time import process_time
 
 import numpy as np
 import pytest
@@ -93,6 +94,18 @@ def test_full_maps_have_proven_and_sound_answers(name, robot):
     assert is_free(scene.world, found.hold.q)
     assert clearance(scene.world, found.hold.q) > 0
     assert touching(scene.world, found.hold.q) == ()
+
+
+def test_one_optimisation_is_quick_enough():
+    scenes = [
+        make_scene(name, receiver="L-M", robot=robot) for name in object_names()[::4] for robot in ("pr2", "panda")
+    ]
+    times = []
+    for scene in scenes:
+        start = process_time()
+        optimise(scene)
+        times.append(process_time() - start)
+    assert np.median(times) <= 0.15
 
 
 def test_another_solver_can_be_plugged_in():
