@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mlnlite.domains.handover import load
+from mlnlite.domains.handover.cli_knowledge import dataset, query, train
 
 if TYPE_CHECKING:
     from mlnlite.domains.handover.fields import Options
@@ -202,3 +203,7 @@ _COMPARE = """# Five checks
 Written by `mlnlite handover compare --robot {robot} --posture {posture} --out docs/handover`; do not edit.
 
 {table}"""
+
+
+for _command in (dataset, train, query):
+    handover.add_command(_command)

@@ -1,0 +1,57 @@
+"""Facts: an object, a task and a level in, tuples of a predicate and its constants out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from mlnlite.domains.handover.knowledge.words import environments_of, level_constant, role_of
+from mlnlite.domains.handover.objects import HandoverObject, region_of
+
+Fact = tuple[str, ...]
+"""A predicate and its constants."""
+THING = "x"
+"""The constant that stands for the object of an instance, as in the published data."""
+
+
+def object_facts(thing: HandoverObject, task: str) -> tuple[Fact, ...]:
+    """What is known of an object about to be used for a task.
+
+    Raises:
+        MlnError: the object does not afford the task.
+    """
+    region_of(thing, task)
+    looks: list[Fact] = [
+        ("hasShape", THING, thing.shape),
+        ("isA", THING, thing.category),
+        ("hasMaterial", THING, thing.material),
+        ("hasTexture", THING, thing.texture),
+        ("hasAffordance", THING, task),
+    ]
+    looks += [("canBeFound", THING, place) for place in environments_of(thing)]
+    return (*looks, *(("hasPart", THING, str(i + 1), role_of(thing, r)) for i, r in enumerate(thing.regions)))
+
+
+def level_facts(level: str | None) -> tuple[Fact, ...]:
+    """The receiver's mobility, or nothing if it is unknown."""
+    return () if level is None else (("armMobility", level_constant(level)),)
+
+
+def label_facts(region: int, method: str) -> tuple[Fact, ...]:
+    """The answer of an instance: region counted from 1, method as a constant of the models."""
+    return ("graspRegion", THING, str(region)), ("handover", THING, method)
+
+
+def kept(facts: Iterable[Fact], predicates: Iterable[str]) -> tuple[Fact, ...]:
+    """The facts whose predicate a model knows."""
+    names = frozenset(predicates)
+    return tuple(fact for fact in facts if fact[0] in names)
+
+
+def fact_text(fact: Fact) -> str:
+    """`hasShape(x, cube)`."""
+    return f"{fact[0]}({', '.join(fact[1:])})"
+
+
+def databases_text(instances: Sequence[Sequence[Fact]]) -> str:
+    """The text of a `.db` file with one database for each instance."""
+    return "---\n".join("".join(f"{fact_text(fact)}\n" for fact in facts) for facts in instances)
