@@ -111,9 +111,7 @@ def _learned(inputs: _Inputs, options: _Options) -> LearnedModel:
         databases = ml.read_evidence(*inputs.databases, model=model)
     predict = names(options["predict"]) or None
     with working("learning"):
-        return ml.learn(
-            model, databases, prior=_prior_sd(options), predict=predict, time_limit=options["time_limit"]
-        )
+        return ml.learn(model, databases, prior=_prior_sd(options), predict=predict, time_limit=options["time_limit"])
 
 
 def _prior_sd(options: _Options) -> float | None:

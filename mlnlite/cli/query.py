@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, cast
 
 import click
 
@@ -28,10 +28,27 @@ from mlnlite.cli.worlds import closed_world, evidence_of_one_world, opened
 from mlnlite.errors import QueryMistake
 
 if TYPE_CHECKING:
+    from mlnlite.infer.approach import MarginalMethod
+    from mlnlite.infer.rungs import Method as MapMethod
     from mlnlite.model.evidence import Evidence
     from mlnlite.model.model import Model
     from mlnlite.results import MapState, Marginals
     from mlnlite.syntax.tree import Dialect
+
+
+_METHODS = {
+    "auto": ("marginal", "map"),
+    "exact": ("marginal",),
+    "lifted": ("marginal",),
+    "wmc": ("marginal",),
+    "gibbs": ("marginal",),
+    "mcsat": ("marginal",),
+    "tempering": ("marginal",),
+    "bp": ("marginal",),
+    "ve": ("map",),
+    "wcsp": ("map",),
+    "ilp": ("map",),
+}
 
 
 class _Options(TypedDict):
@@ -41,11 +58,13 @@ class _Options(TypedDict):
     task: Literal["marginal", "map"]
     closed_world: tuple[str, ...]
     open_world: tuple[str, ...]
-    method: Literal["auto", "ve", "wcsp"]
+    method: str
     database: int | None
     output: Path | None
     time_limit: float | None
     seed: int
+    precision: float
+    chains: int
     width_limit: int | None
     dialect: Dialect | None
     format: Literal["text", "json", "csv"]
@@ -68,14 +87,26 @@ class _Options(TypedDict):
 @open_world_option
 @click.option(
     "--method",
-    type=click.Choice(["auto", "ve", "wcsp"]),
+    type=click.Choice(list(_METHODS)),
     default="auto",
     show_default=True,
-    help="`ve`: variable elimination; `wcsp`: toulbar2 (MAP only).",
+    help="For probabilities: "
+    + ", ".join(f"`{m}`" for m, tasks in _METHODS.items() if "marginal" in tasks)
+    + "; for the most probable world: "
+    + ", ".join(f"`{m}`" for m, tasks in _METHODS.items() if "map" in tasks)
+    + ".",
 )
 @database_option
 @output_option
-@time_limit_option("Stop the search for the most probable world after this long, with the best so far.")
+@time_limit_option("Stop sampling, or the search for the most probable world, after this long with what there is.")
+@click.option(
+    "--precision",
+    type=click.FloatRange(min=0, min_open=True),
+    default=0.005,
+    show_default=True,
+    help="Largest standard error of probabilities that are sampled.",
+)
+@click.option("--chains", type=click.IntRange(min=2), default=4, show_default=True, help="How many are sampled.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Where chance starts.")
 @click.option(
     "--width-limit",
@@ -115,25 +146,33 @@ def _answer(model: Model, evidence: Evidence, items: list[str], options: _Option
             evidence,
             items or None,
             closed_world=closed,
-            method=options["method"],
+            method=cast("MapMethod", options["method"]),
             time_limit=options["time_limit"],
             seed=options["seed"],
         )
-    return ml.marginal(model, evidence, items, closed_world=closed, width_limit=options["width_limit"] or WIDTH_LIMIT)
+    return ml.marginal(
+        model,
+        evidence,
+        items,
+        closed_world=closed,
+        method=cast("MarginalMethod", options["method"]),
+        width_limit=options["width_limit"] or WIDTH_LIMIT,
+        precision=options["precision"],
+        time_limit=options["time_limit"],
+        chains=options["chains"],
+        seed=options["seed"],
+    )
 
 
 def _verify(options: _Options, items: list[str]) -> None:
     """Complains about options that do not fit the task."""
-    if options["task"] == "map":
-        if options["width_limit"] is not None:
-            raise click.UsageError("--width-limit is for --task marginal; --task map takes --time-limit")
-        return
-    if not items:
+    tasks = _METHODS[options["method"]]
+    if options["task"] not in tasks:
+        raise click.UsageError(f"--method {options['method']} is for --task {tasks[0]}")
+    if options["task"] == "map" and options["width_limit"] is not None:
+        raise click.UsageError("--width-limit is for --task marginal; --task map takes --time-limit")
+    if options["task"] == "marginal" and not items:
         raise QueryMistake("nothing is asked", "name predicates, atoms or formulas: `-q Smokes,Cancer(Ann)`")
-    if options["time_limit"] is not None:
-        raise click.UsageError("--time-limit is for --task map; --task marginal takes --width-limit")
-    if options["method"] == "wcsp":
-        raise click.UsageError("--method wcsp is for --task map")
 
 
 def _formatted(answer: Marginals | MapState, format_name: str, *, whole: bool) -> str:
@@ -151,8 +190,8 @@ def _csv(answer: Marginals | MapState) -> str:
 
     rows: list[tuple[object, ...]]
     if isinstance(answer, Marginals):
-        numbers = (answer.probabilities.tolist(), answer.methods, answer.exact.tolist(), answer.error.tolist())
-        rows = [("name", "probability", "method", "exact", "error"), *zip(answer.names, *numbers, strict=True)]
+        columns = answer.columns()
+        rows = [tuple(columns), *zip(*columns.values(), strict=True)]
     else:
         rows = [("name", "truth", "method"), *zip(answer.names, answer.truth.tolist(), answer.methods, strict=True)]
     text = io.StringIO()
