@@ -68,7 +68,7 @@ _HOMES = {
     "scene": "Layout Scene make_scene",
 }
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split()}
-_PARTS = ("pinocchio", "coal", "trimesh", "scipy", "numpy", "numba", "pink", "matplotlib", "viser")
+_PARTS = ("pinocchio", "coal", "trimesh", "scipy", "numpy", "numba", "pink", "matplotlib", "viser", "pandas", "pingouin")
 
 
 def load(module: str) -> Any:  # noqa: ANN401 - a module is what its user knows it to be

@@ -12,6 +12,7 @@ import click
 
 from mlnlite.domains.handover import load
 from mlnlite.domains.handover.cli_knowledge import dataset, query, train
+from mlnlite.domains.handover.cli_study import study
 
 if TYPE_CHECKING:
     from mlnlite.domains.handover.fields import Options
@@ -205,5 +206,5 @@ Written by `mlnlite handover compare --robot {robot} --posture {posture} --out d
 {table}"""
 
 
-for _command in (dataset, train, query):
+for _command in (study, dataset, train, query):
     handover.add_command(_command)
