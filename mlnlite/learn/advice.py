@@ -113,7 +113,7 @@ def separable(rows: sparse.csr_array) -> Float:
     constraint: Any = sparse.hstack([-filled, sparse.eye_array(n)], format="csr")
     cost = np.concatenate([np.zeros(k), -np.ones(n)])
     bounds = [(-1e3, 1e3)] * k + [(0.0, 1.0)] * n
-    found = linprog(cost, A_ub=constraint, b_ub=np.zeros(n), bounds=bounds, method="highs")
+    found: Any = linprog(cost, A_ub=constraint, b_ub=np.zeros(n), bounds=bounds, method="highs")
     if found.x is None or -found.fun < 1e-6:
         return np.zeros(k)
     return np.asarray(found.x[:k] / max(1e-300, np.abs(found.x[:k]).max()))

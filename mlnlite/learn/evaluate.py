@@ -12,18 +12,16 @@ from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
 from mlnlite.infer.answer import marginal
+from mlnlite.learn import metrics
+from mlnlite.learn.metrics import Calibration, Predictions
 from mlnlite.model.evidence import Evidence, Facts
 from mlnlite.model.facts import closed
 from mlnlite.model.model import Model
 from mlnlite.model.read import one_database
 from mlnlite.model.symbols import Predicate
-from mlnlite.results import Marginals
 
 Float = NDArray[np.float64]
 Int64 = NDArray[np.int64]
-
-SMALLEST = 1e-12
-"""Probabilities below are taken as this in the log-loss, so that one impossible label does not hide all others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +36,11 @@ class Score:
         balanced_accuracy: mean over the label's values of the share that is hit.
         log_loss: mean of `-log p(label)`, natural logarithm.
         brier: mean of `(p - label)^2`, for blocks summed over the values.
+        auc_pr: average precision of single statements: each atom, or each value of each block; nan if none is true.
+        auc_roc: chance that a true statement gets more than a false one; nan if all are alike.
+        calibration_error: mean distance of what is said and how often it is so, in bins.
         majority: accuracy of always saying the most frequent label.
+        calibration: the bins.
     """
 
     predicate: str
@@ -48,7 +50,11 @@ class Score:
     balanced_accuracy: float
     log_loss: float
     brier: float
+    auc_pr: float
+    auc_roc: float
+    calibration_error: float
     majority: float
+    calibration: Calibration
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,27 +71,33 @@ class Evaluation:
 
     def __str__(self) -> str:
         """A table."""
-        head = ("predicate", "labels", "accuracy", "balanced", "log-loss", "Brier", "majority")
+        numbers = ("accuracy", "balanced", "log-loss", "Brier", "AUC-PR", "AUC-ROC", "calib.", "majority")
+        head = ("predicate", "labels", *numbers)
         rows = [head, *map(_row, self.scores)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = ["  ".join(_padded(row, widths)).rstrip() for row in rows]
         return "\n".join([*lines, f"{self.n_databases:,} database{'s' * (self.n_databases != 1)} with labels"])
 
     def to_dict(self) -> dict[str, object]:
-        """Plain data."""
-        names = Score.__slots__
-        return {
-            "n_databases": self.n_databases,
-            "scores": [{name: getattr(score, name) for name in names} for score in self.scores],
-        }
+        """Plain data; what is not a number is None."""
+        return {"n_databases": self.n_databases, "scores": [_data(score) for score in self.scores]}
 
     def to_json(self, indent: int | None = 2) -> str:
         """JSON text."""
         return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
 
 
+def _data(score: Score) -> dict[str, object]:
+    plain = {name: getattr(score, name) for name in Score.__slots__ if name != "calibration"}
+    bins = score.calibration
+    columns = {"confidence": bins.confidence.tolist(), "share": bins.share.tolist(), "n": bins.n.tolist()}
+    numbers = {k: None if isinstance(v, float) and np.isnan(v) else v for k, v in plain.items()}
+    return {**numbers, "calibration": {k: [None if x != x else x for x in v] for k, v in columns.items()}}
+
+
 def _row(score: Score) -> tuple[str, ...]:
-    numbers = (score.accuracy, score.balanced_accuracy, score.log_loss, score.brier, score.majority)
+    names = ("accuracy", "balanced_accuracy", "log_loss", "brier", "auc_pr", "auc_roc", "calibration_error", "majority")
+    numbers = [getattr(score, name) for name in names]
     return (score.predicate, f"{score.n:,} {score.unit}", *(f"{x:.4f}" for x in numbers))
 
 
@@ -118,44 +130,52 @@ def evaluate(
         QueryMistake: if there is no such predicate, or no label.
         LimitReached: if a marginal cannot be found within the limits.
     """
-    targets = _targets(evidence, predicates)
+    targets = target_names(evidence, predicates)
+    found = predictions(model, evidence, targets, closed_world)
+    scores = []
+    for name in targets:
+        parts = [of[name] for of in found.values() if name in of]
+        scores.append(_score(evidence.predicates[name], together(evidence.predicates[name], parts)))
+    return Evaluation(tuple(scores), len(found))
+
+
+def predictions(
+    model: Model, evidence: Evidence, targets: Sequence[str], closed_world: Iterable[str] | Literal["all"] = "all"
+) -> dict[int, dict[str, Predictions]]:
+    """What is predicted of each database that has labels, by its number and the predicate. Arguments as `evaluate`."""
     others = set(evidence.predicates) - set(targets)
     evidence = closed(evidence, _closable(evidence, others) if closed_world == "all" else closed_world)
     explicit = {name for name in targets if not evidence.facts[name].truth.all()}
-    model = _without_zeros(model, evidence)
-    outcomes: dict[str, list[_Outcomes]] = {name: [] for name in targets}
-    answers: dict[bytes, Marginals] = {}
-    labelled = np.unique(np.concatenate([evidence.facts[name].database for name in targets])).tolist()
-    for i in labelled:
+    found: dict[int, dict[str, Predictions]] = {}
+    for i in np.unique(np.concatenate([evidence.facts[name].database for name in targets])).tolist():
         one = one_database(evidence, i)
-        hidden = _without(one, targets)
-        key = _content(hidden)
-        if key not in answers:
-            answers[key] = marginal(model, hidden, targets)
-        for name in targets:
-            if len(one.facts[name].truth):
-                outcomes[name].append(_outcomes(one, name, answers[key], explicit=name in explicit))
-    return Evaluation(tuple(_score(evidence.predicates[name], outcomes[name]) for name in targets), len(labelled))
+        answer = marginal(model, _without(one, targets), targets)
+        found[i] = {
+            name: _predictions(one, name, answer, explicit=name in explicit)
+            for name in targets
+            if len(one.facts[name].truth)
+        }
+    return found
 
 
-def _without_zeros(model: Model, evidence: Evidence) -> Model:
-    """The model without formulas of weight 0, which change no probability; in a learnt template most do."""
-    kept = []
-    for template in (t.expanded(evidence.types) for t in model.templates):
-        assert template.rows is not None
-        rows = np.flatnonzero(template.weights != 0)
-        if len(rows):
-            kept.append(replace(template, rows=template.rows[rows], weights=template.weights[rows], row_spans=()))
-    return replace(model, templates=tuple(kept))
+def together(predicate: Predicate, parts: Sequence[Predictions]) -> Predictions:
+    """Predictions of several databases.
+
+    Raises:
+        QueryMistake: if there is no label.
+    """
+    label = np.concatenate([o.label for o in parts]) if parts else np.empty(0, np.int64)
+    if not len(label):
+        raise QueryMistake(f"no block of {predicate} has a value among the facts", "give its values as facts")
+    return Predictions(np.concatenate([o.p for o in parts]), label, predicate.value is None)
 
 
-def _content(evidence: Evidence) -> bytes:
-    """What is known, as bytes: databases that say the same have the same answer."""
-    facts = (array for f in evidence.facts.values() for array in (np.array(len(f.truth)), f.arguments, f.truth))
-    return b"".join(array.tobytes() for array in (*facts, *evidence.present.values()))
+def target_names(evidence: Evidence, predicates: Iterable[str]) -> list[str]:
+    """The predicates, each once.
 
-
-def _targets(evidence: Evidence, predicates: Iterable[str]) -> list[str]:
+    Raises:
+        QueryMistake: if there is none, or one is unknown or without facts.
+    """
     targets = list(dict.fromkeys(predicates))
     if not targets:
         raise QueryMistake("nothing is evaluated", "name the predicates whose facts are the labels")
@@ -205,20 +225,7 @@ def _truth(evidence: Evidence, name: str, atoms: NDArray[np.int32]) -> Float:
 # --- one predicate in one database
 
 
-@dataclass(frozen=True, slots=True)
-class _Outcomes:
-    """Labels and their predicted distributions.
-
-    Attributes:
-        p: shape (n, n_values), probability of each value.
-        label: shape (n,), the true value.
-    """
-
-    p: Float
-    label: Int64
-
-
-def _outcomes(evidence: Evidence, name: str, answer: Mapping[str, float], *, explicit: bool) -> _Outcomes:
+def _predictions(evidence: Evidence, name: str, answer: Mapping[str, float], *, explicit: bool) -> Predictions:
     """Labels of one database; the values of a block are its constants' ids, and after them "none"."""
     predicate = evidence.predicates[name]
     atoms = _atoms(evidence, predicate)
@@ -228,7 +235,7 @@ def _outcomes(evidence: Evidence, name: str, answer: Mapping[str, float], *, exp
         truth = np.nan_to_num(truth)
     if predicate.value is None:
         known = ~np.isnan(truth)
-        return _Outcomes(np.stack([1 - p, p], axis=1)[known], truth[known].astype(np.int64))
+        return Predictions(np.stack([1 - p, p], axis=1)[known], truth[known].astype(np.int64), binary=True)
     n_values = len(evidence.types[predicate.types[predicate.value]].constants)
     values = np.unique(atoms[:, predicate.value])
     p, truth = p.reshape(-1, len(values)), truth.reshape(-1, len(values))
@@ -238,26 +245,22 @@ def _outcomes(evidence: Evidence, name: str, answer: Mapping[str, float], *, exp
     has_value = (truth == 1).any(axis=1)
     label = np.where(has_value, values[np.nan_to_num(truth).argmax(axis=1)], n_values)
     known = has_value | ((truth == 0).all(axis=1) & (predicate.marker == "?"))
-    return _Outcomes(spread[known], label[known])
+    return Predictions(spread[known], label[known], binary=False)
 
 
-def _score(predicate: Predicate, found: Sequence[_Outcomes]) -> Score:
-    p = np.concatenate([o.p for o in found])
-    label = np.concatenate([o.label for o in found])
-    if not len(label):
-        raise QueryMistake(f"no block of {predicate} has a value among the facts", "give its values as facts")
-    hit = p.argmax(axis=1) == label
-    n_values = np.bincount(label, minlength=1)
-    recalls = np.bincount(label, hit)[n_values > 0] / n_values[n_values > 0]
-    given = p[np.arange(len(label)), label]
-    brier = ((p - np.eye(p.shape[1])[label]) ** 2).sum(axis=1)
+def _score(predicate: Predicate, found: Predictions) -> Score:
+    bins = metrics.calibration(found)
     return Score(
         predicate=predicate.name,
-        unit="atoms" if predicate.value is None else "blocks",
-        n=len(label),
-        accuracy=float(hit.mean()),
-        balanced_accuracy=float(recalls.mean()),
-        log_loss=float(-np.log(np.maximum(given, SMALLEST)).mean()),
-        brier=float(brier.mean()) / (2 if predicate.value is None else 1),
-        majority=float(n_values.max() / len(label)),
+        unit="atoms" if found.binary else "blocks",
+        n=len(found.label),
+        accuracy=metrics.accuracy(found),
+        balanced_accuracy=metrics.balanced_accuracy(found),
+        log_loss=metrics.log_loss(found),
+        brier=metrics.brier(found),
+        auc_pr=metrics.auc_pr(found),
+        auc_roc=metrics.auc_roc(found),
+        calibration_error=bins.error,
+        majority=metrics.majority(found),
+        calibration=bins,
     )
