@@ -65,9 +65,8 @@ def test_other_predicates_are_complete_unless_open():
 def test_a_result_prints_and_is_plain_data():
     model = ml.model_from_text(COIN)
     found = ml.evaluate(model, ml.evidence_from_text("P(A)", model=model), predicates=["P"])
-    assert str(found).splitlines()[0].split() == [
-        *("predicate", "labels", "accuracy", "balanced", "log-loss", "Brier", "majority")
-    ]
+    head = str(found).splitlines()[0].split()
+    assert {"predicate", "labels", "accuracy", "balanced", "log-loss", "Brier", "majority"} <= set(head)
     assert found.to_dict()["scores"][0]["predicate"] == "P"
     assert '"n_databases": 1' in found.to_json()
 
