@@ -5,23 +5,24 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mlnlite.arviz import inference_data
 from mlnlite.errors import MissingPart, QueryMistake, did_you_mean
+from mlnlite.table import SHOWN, html_table, text_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 Int64 = NDArray[np.int64]
 
-_SHOWN = 60
 _PAID = 10
 
 
@@ -76,6 +77,12 @@ class Marginals(Mapping[str, float]):
         log_z: log partition function, nan if it is not known.
         statistics: what it took.
         block: shape (n,), number of the functional block of each atom, -1 for none.
+        low: shape (n,), lower end of a 95 % interval; the probability itself where exact.
+        high: shape (n,), its upper end.
+        r_hat: shape (n,), rank-normalised split R-hat, nan where not sampled or never seen to change.
+        effective_size: shape (n,), effective sample size, nan likewise.
+        traces: of sampling, shape (n_chains, n_batches) each: log-weight of the world and true groundings of formulas.
+        draws: of each sampling, rows and series of shape (n_chains, n_batches, n_rows): means of batches of draws.
     """
 
     names: tuple[str, ...]
@@ -87,11 +94,22 @@ class Marginals(Mapping[str, float]):
     log_z: float = float("nan")
     statistics: Statistics = Statistics()
     block: Int64 | None = None
+    low: Float | None = None
+    high: Float | None = None
+    r_hat: Float | None = None
+    effective_size: Float | None = None
+    traces: Mapping[str, Float] = field(default_factory=dict, repr=False)
+    draws: tuple[tuple[Int64, Float32], ...] = field(default=(), repr=False)
     _index: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Prepares look-up by text."""
+        """Prepares look-up by text; what is not given follows from the probabilities being exact."""
         object.__setattr__(self, "_index", _index_of(self.names))
+        nothing = np.full(len(self.names), np.nan)
+        default = {"low": self.probabilities, "high": self.probabilities, "r_hat": nothing, "effective_size": nothing}
+        for name, values in default.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, values)
 
     def __getitem__(self, name: str) -> float:
         """Probability of an atom or formula, by its text; spaces do not matter."""
@@ -107,7 +125,7 @@ class Marginals(Mapping[str, float]):
 
     def __str__(self) -> str:
         """A table, of the first rows if there are many."""
-        return self.to_text(_SHOWN)
+        return self.to_text(SHOWN)
 
     def to_text(self, limit: int | None = None) -> str:
         """A table, predicate by predicate and block by block.
@@ -116,26 +134,53 @@ class Marginals(Mapping[str, float]):
             limit: show at most so many rows.
         """
         summary = [f"status: {self.status}"] + ([f"log Z = {self.log_z:.6f}"] if isfinite(self.log_z) else [])
-        return _text(_HEAD, self._rows(), limit, [", ".join(summary), str(self.statistics)])
+        return text_table(self._head(), self._rows(), limit, [", ".join(summary), str(self.statistics)])
+
+    def _head(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return (*_HEAD[:2], "R-hat", "effective size", *_HEAD[2:]) if self.draws else _HEAD
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Cells of the table."""
         order = _order(self.names, self.block)
-        bars = [f" +- {e:.4f}" if e > 0 else "" for e in self.error.tolist()]
-        return [(self.names[i], f"{self.probabilities[i]:.4f}{bars[i]}", self.methods[i]) for i in order]
+        rows = []
+        for i in order:
+            extra = [_cell(values[i], form) for values, form in self._diagnostics()]
+            rows.append((self.names[i], self._bar(i), *extra, self.methods[i]))
+        return rows
+
+    def _diagnostics(self) -> Sequence[tuple[Float, str]]:
+        """R-hat and effective sizes, with how to write them, if anything was sampled."""
+        if not self.draws or self.r_hat is None or self.effective_size is None:
+            return ()
+        return (self.r_hat, ".3f"), (self.effective_size, ",.0f")
+
+    def _bar(self, i: int) -> str:
+        """A probability with its error, or with its interval where it was never seen to be otherwise."""
+        p, error = self.probabilities[i], self.error[i]
+        if self.exact[i]:
+            return f"{p:.4f}"
+        if (
+            self.draws
+            and self.r_hat is not None
+            and np.isnan(self.r_hat[i])
+            and self.low is not None
+            and self.high is not None
+        ):
+            return f"{p:.4f} in [{self.low[i]:.4f}, {self.high[i]:.4f}]"
+        return f"{p:.4f} +- {error:.4f}"
 
     def _repr_html_(self) -> str:
         """A table for notebooks."""
-        return _html(_HEAD, self._rows(), f"status: {self.status}")
+        return html_table(self._head(), self._rows(), f"status: {self.status}")
 
     def to_dict(self) -> dict[str, object]:
         """Plain data."""
-        keys = ("name", "probability", "method", "exact", "error")
-        columns = (self.names, self.probabilities.tolist(), self.methods, self.exact.tolist(), self.error.tolist())
+        columns = self.columns()
         return {
             "status": self.status,
             "log_z": _number(self.log_z),
-            "marginals": [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)],
+            "marginals": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
             "statistics": self.statistics.to_dict(),
         }
 
@@ -149,8 +194,32 @@ class Marginals(Mapping[str, float]):
         Raises:
             MissingPart: pandas is not installed.
         """
-        columns = {"name": self.names, "probability": self.probabilities, "method": self.methods}
-        return _frame({**columns, "exact": self.exact, "error": self.error})
+        return _frame(self.columns())
+
+    def columns(self) -> dict[str, list[object]]:
+        """All that is known of each row, by name of the column; what sampling adds only if there was any."""
+        sampled = {"low": self.low, "high": self.high, "r_hat": self.r_hat, "effective_size": self.effective_size}
+        given = sampled if self.draws else {}
+        numbers = {name: [_number(x) for x in values.tolist()] for name, values in given.items() if values is not None}
+        return {
+            "name": list(self.names),
+            "probability": list(self.probabilities.tolist()),
+            "method": list(self.methods),
+            "exact": list(self.exact.tolist()),
+            "error": list(self.error.tolist()),
+            **numbers,
+        }
+
+    def to_inference_data(self) -> Any:  # noqa: ANN401
+        """What was sampled, for ArviZ: `InferenceData` of its first generation, a `DataTree` of its second.
+
+        The variable `probability` holds, for each batch of draws, the mean probability of each atom given all others.
+
+        Raises:
+            QueryMistake: nothing was sampled.
+            MissingPart: ArviZ is not installed.
+        """
+        return inference_data(self.names, self.draws, self.traces)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +306,7 @@ class MapState(Mapping[str, bool]):
 
     def __str__(self) -> str:
         """The true atoms and what they cost, of the first rows if there are many."""
-        return self.to_text(_SHOWN)
+        return self.to_text(SHOWN)
 
     def to_text(self, limit: int | None = None) -> str:
         """The true atoms, then the formulas that they violate.
@@ -254,7 +323,7 @@ class MapState(Mapping[str, bool]):
         if isfinite(self.cost):
             open_ = f"{self.open_cost:.6f} of it where evidence leaves a choice"
             summary.insert(0, f"cost: {self.cost:.6f}, {open_}; no world costs less than {self.cost - self.gap:.6f}")
-        return _text(("true atom", "method"), self._rows(), limit, [*paid, *summary, str(self.statistics)])
+        return text_table(("true atom", "method"), self._rows(), limit, [*paid, *summary, str(self.statistics)])
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Cells of the table."""
@@ -263,7 +332,7 @@ class MapState(Mapping[str, bool]):
     def _repr_html_(self) -> str:
         """A table for notebooks."""
         caption = f"status: {self.status}, log-weight {self.log_weight:.4f}, gap {self.gap:.3g}"
-        return _html(("true atom", "method"), self._rows(), caption)
+        return html_table(("true atom", "method"), self._rows(), caption)
 
     def to_dict(self) -> dict[str, object]:
         """Plain data."""
@@ -297,6 +366,11 @@ class MapState(Mapping[str, bool]):
 _HEAD = ("atom or formula", "probability", "method")
 
 
+def _cell(value: float, form: str) -> str:
+    """A number, or nothing."""
+    return format(value, form) if isfinite(value) else ""
+
+
 def _number(value: float) -> float | None:
     """A number as JSON knows it."""
     return value if isfinite(value) else None
@@ -325,25 +399,6 @@ def _order(names: Sequence[str], block: Int64 | None) -> list[int]:
     first = [i if b < 0 else blocks.setdefault(b, i) for i, b in enumerate([] if block is None else block.tolist())]
     place = first or range(len(names))
     return sorted(range(len(names)), key=lambda i: (predicates[names[i].partition("(")[0]], place[i], i))
-
-
-def _text(head: tuple[str, ...], rows: list[tuple[str, ...]], limit: int | None, foot: Sequence[str]) -> str:
-    """A table in plain text."""
-    shown = [head, *(rows if limit is None else rows[:limit])]
-    widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
-    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in shown]
-    lines.insert(1, "  ".join("-" * w for w in widths))
-    left = len(rows) - len(shown) + 1
-    return "\n".join([*lines, *([f"... {left:,} more"] if left else []), *foot])
-
-
-def _html(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str) -> str:
-    """A table in HTML, its first rows if there are many."""
-    body = "".join(f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in row)}</tr>" for row in rows[:_SHOWN])
-    more = f" ({len(rows) - _SHOWN:,} more rows)" if len(rows) > _SHOWN else ""
-    top = "".join(f"<th>{escape(h)}</th>" for h in head)
-    caption = f"<caption>{escape(caption)}{more}</caption>"
-    return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def _frame(columns: Mapping[str, object]) -> pd.DataFrame:

@@ -14,9 +14,11 @@ from mlnlite.errors import QueryMistake
 from mlnlite.ground.ground import ground
 from mlnlite.ground.groups import renamed
 from mlnlite.ground.network import Network
-from mlnlite.infer.formula import formula_probabilities
+from mlnlite.infer.approach import Approach, MarginalMethod
+from mlnlite.infer.ladder import solve
 from mlnlite.infer.map import map_of
-from mlnlite.infer.marginal import WIDTH_LIMIT, marginals_of
+from mlnlite.infer.marginal import WIDTH_LIMIT
+from mlnlite.infer.marginals import marginals_from
 from mlnlite.infer.query import Question, atom_numbers, question_of
 from mlnlite.infer.rungs import Method
 from mlnlite.infer.score import costs, counts
@@ -31,18 +33,24 @@ from mlnlite.results import MapState, Marginals, Statistics, Violation
 Int64 = NDArray[np.int64]
 
 EVIDENCE = "evidence"
+LADDER = Approach()
 
 
-def marginal(
+def marginal(  # noqa: PLR0913
     model: Model,
     evidence: Evidence,
     query: str | Sequence[str] | None = None,
     *,
     closed_world: str | Iterable[str] = (),
+    method: MarginalMethod = "auto",
     width_limit: int = WIDTH_LIMIT,
+    precision: float = 0.005,
+    time_limit: float | None = None,
+    chains: int = 4,
+    seed: int = 0,
     engine: Engine | None = None,
 ) -> Marginals:
-    """Probabilities of atoms and formulas given evidence.
+    """Probabilities of atoms and formulas given evidence: exact wherever that is cheap, else with error bars.
 
     Args:
         model: a model with weights.
@@ -51,52 +59,53 @@ def marginal(
             formula leaves open.
         closed_world: predicates of which everything that is not a fact is false; "all" for all that the query does
             not mention (but functional predicates `!` without a known value stay open).
+        method: "auto" (exact where it fits, else sampled), "exact" (or refuse), "lifted", "wmc", or "gibbs", "mcsat",
+            "tempering", "bp" for everything.
         width_limit: largest number of entries of a table in exact inference.
+        precision: largest standard error of what is sampled; sampling stops when it is reached.
+        time_limit: [s] for sampling, 60 by default; the result then says what is not as precise as asked.
+        chains: how many are sampled, at least 2.
+        seed: where the chance of sampling starts.
         engine: what runs the grounding plans; by default chosen by size.
 
     Raises:
         QueryMistake: if the query, or a closed world, does not fit the model.
         Contradiction: if no world satisfies the evidence and the hard formulas.
-        LimitReached: if an exact answer would need more than the limit.
+        LimitReached: if an exact answer was asked for and would need more than the limit.
+        MissingPart: if the method needs something that is not installed.
     """
+    approach = Approach(method, width_limit, precision, time_limit, chains, seed)
     asked = _ask(model, evidence, query, closed_world, engine)
-    return marginals_for(asked.network, asked.question, width_limit, asked.seconds)
+    return marginals_for(asked.network, asked.question, approach, asked.seconds)
 
 
 def marginals_for(
-    network: Network, question: Question, width_limit: int = WIDTH_LIMIT, ground_seconds: float = 0.0
+    network: Network,
+    question: Question,
+    approach: Approach = LADDER,
+    ground_seconds: float = 0.0,
 ) -> Marginals:
     """Answers a question about a network; see `marginal`."""
     index, truth = _locate(network, question.atoms)
     start = perf_counter()
-    unknown = index >= 0
-    every = len(np.unique(index[unknown])) == network.n_atoms
-    found = marginals_of(network, None if every else np.unique(index[unknown]), width_limit=width_limit)
-    probability = truth.astype(float)
-    probability[unknown] = found.probability[index[unknown]]
-    methods = [found.method[i] if i >= 0 else EVIDENCE for i in index.tolist()]
-    names = _texts(network.evidence, question.atoms)
-    if question.formulas:
-        expressions = [_over_network(f.expression, network) for f in question.formulas]
-        of_formulas = formula_probabilities(network, expressions, width_limit=width_limit)
-        probability = np.concatenate([probability, of_formulas])
-        names += [f.text for f in question.formulas]
-        methods += ["elimination"] * len(expressions)
+    places, row = np.unique(index[index >= 0], return_inverse=True)
+    expressions = [_over_network(f.expression, network) for f in question.formulas]
+    solution = solve(network, places, expressions, approach)
+    source = np.full(len(index) + len(expressions), -1, np.int64)
+    source[: len(index)][index >= 0] = row.ravel()
+    source[len(index) :] = len(places) + np.arange(len(expressions))
     seconds = {"ground": ground_seconds, "infer": perf_counter() - start}
-    return Marginals(
-        names=tuple(names),
-        probabilities=probability,
-        methods=tuple(methods),
-        exact=np.ones(len(names), bool),
-        error=np.zeros(len(names)),
-        status="exact",
-        log_z=found.log_z,
-        statistics=Statistics(network.n_atoms, network.n_factors, found.n_components, found.largest_table, seconds),
-        block=_blocks(network, index, len(names)),
+    names = [*_texts(network.evidence, question.atoms), *(f.text for f in question.formulas)]
+    return marginals_from(
+        names,
+        (source, truth),
+        solution,
+        Statistics(network.n_atoms, network.n_factors, solution.n_components, solution.largest_table, seconds),
+        _blocks(network, index, len(names)),
     )
 
 
-def map_state(
+def map_state(  # noqa: PLR0913
     model: Model,
     evidence: Evidence,
     query: str | Sequence[str] | None = None,

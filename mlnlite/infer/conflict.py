@@ -40,9 +40,9 @@ def _core(network: Network) -> list[int]:
     """Hard weights that exclude each other: the solver's core, less each that can be left out."""
     first = network.n_atoms + 1
     with Solver(name="cadical153") as solver:
-        for literals in _blocks(network):
+        for literals in block_clauses(network):
             solver.add_clause(literals)
-        for weight, literals in _hard_clauses(network):
+        for weight, literals in hard_clauses(network):
             solver.add_clause([-(first + weight), *literals])
         core = np.flatnonzero(np.isposinf(network.weights)) + first
         if solver.solve(assumptions=core.tolist()):
@@ -55,7 +55,7 @@ def _core(network: Network) -> list[int]:
     return [int(w) - first for w in keep]
 
 
-def _blocks(network: Network) -> Iterator[list[int]]:
+def block_clauses(network: Network) -> Iterator[list[int]]:
     """Clauses that give each block one value."""
     order = np.argsort(network.variable, kind="stable")
     starts = np.searchsorted(network.variable[order], np.arange(network.n_variables + 1))
@@ -66,7 +66,7 @@ def _blocks(network: Network) -> Iterator[list[int]]:
         yield from ([-a, -b] for a, b in combinations(atoms, 2))
 
 
-def _hard_clauses(network: Network) -> Iterator[tuple[int, list[int]]]:
+def hard_clauses(network: Network) -> Iterator[tuple[int, list[int]]]:
     """Clauses of the hard groundings, each with its weight."""
     hard = np.isposinf(network.weights)
     for block in network.clauses:

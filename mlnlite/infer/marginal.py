@@ -41,6 +41,8 @@ class AtomProbabilities:
             them, were it counted, would add log 2.) nan if the answer did not need every component.
         n_components: how many components the network has.
         largest_table: number of entries of the largest table.
+        component: shape (n_atoms,), the component of each atom.
+        wide: numbers of the components past the limit.
     """
 
     probability: Float
@@ -49,6 +51,8 @@ class AtomProbabilities:
     log_z: float
     n_components: int
     largest_table: int
+    component: Int32
+    wide: tuple[int, ...]
 
 
 @dataclass(slots=True)
@@ -106,12 +110,13 @@ def marginals_of(
     if found.wide and too_wide == "raise":
         raise limit_reached(network, found.wide, width_limit)
     probability = np.where(asked, found.probability[found.start[network.variable] + network.value], np.nan)
-    label = found.label[network.variable].tolist()
-    method = tuple(found.method[c] if a else "" for c, a in zip(label, asked.tolist(), strict=True))
+    label = found.label[network.variable]
+    method = tuple(found.method[c] if a else "" for c, a in zip(label.tolist(), asked.tolist(), strict=True))
+    wide = tuple(part.component for part, _ in found.wide)
     log_z = float(found.log_z.sum() + potentials.constant)
     exact = ~np.isnan(probability)
     n_components = len(np.unique(found.label[: network.n_variables]))
-    return AtomProbabilities(probability, exact, method, log_z, n_components, found.largest_table)
+    return AtomProbabilities(probability, exact, method, log_z, n_components, found.largest_table, label, wide)
 
 
 def distributions_of(

@@ -1,0 +1,28 @@
+"""Tables for people: come in cells, goes out plain text or HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+SHOWN = 60
+"""Rows that are shown unless all are asked for."""
+
+
+def text_table(head: tuple[str, ...], rows: list[tuple[str, ...]], limit: int | None, foot: Sequence[str]) -> str:
+    """A table in plain text."""
+    shown = [head, *(rows if limit is None else rows[:limit])]
+    widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
+    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in shown]
+    lines.insert(1, "  ".join("-" * w for w in widths))
+    left = len(rows) - len(shown) + 1
+    return "\n".join([*lines, *([f"... {left:,} more"] if left else []), *foot])
+
+
+def html_table(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str) -> str:
+    """A table in HTML, its first rows if there are many."""
+    body = "".join(f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in row)}</tr>" for row in rows[:SHOWN])
+    more = f" ({len(rows) - SHOWN:,} more rows)" if len(rows) > SHOWN else ""
+    top = "".join(f"<th>{escape(h)}</th>" for h in head)
+    caption = f"<caption>{escape(caption)}{more}</caption>"
+    return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
