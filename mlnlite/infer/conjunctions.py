@@ -135,6 +135,9 @@ def cells_of(rows: Conjunctions, cardinality: Int32) -> tuple[list[Cells], float
         Cells, those of equal arity together, and the amount that every world gains.
     """
     n, k = rows.variable.shape
+    if k and (np.diff(rows.variable, axis=1) > 0).all() and (cardinality == 2).all():
+        value = np.where(rows.equal, rows.value, 1 - rows.value).astype(np.int32)
+        return [Cells(rows.variable, value, rows.amount)] if n else [], 0.0
     last = ~rows.equal & (cardinality[rows.variable] > 2)
     columns = np.argsort(last, axis=1, kind="stable")
     part = _Partial(np.arange(n), np.full((n, k), -1, np.int32), np.zeros((n, k), np.int32), rows.amount)

@@ -7,7 +7,6 @@ only ever helps.) Goldstein, Efficient rotamer elimination (Biophysical Journal 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +17,7 @@ from mlnlite.infer.potentials import Potentials
 from mlnlite.infer.propagate import propagate
 
 _PASSES = 50
+_LARGE = 100_000
 
 
 def without_dominated(potentials: Potentials) -> Potentials:
@@ -27,6 +27,7 @@ def without_dominated(potentials: Potentials) -> Potentials:
         drop = dominated(reduced)
         if not drop.any() or np.isneginf(reduced.constant):
             return reduced
+        few = np.count_nonzero(drop) < len(drop) / 20 and len(drop) > _LARGE
         flat = np.flatnonzero(drop)
         start = starts_of(reduced)
         variable = np.searchsorted(start, flat, side="right") - 1
@@ -34,6 +35,8 @@ def without_dominated(potentials: Potentials) -> Potentials:
         forbidden = Cells(variable.astype(np.int32)[:, None], value, np.full(len(flat), -np.inf))
         cells, constant = propagate([*reduced.cells, forbidden], reduced.cardinality, reduced.constant)
         reduced = replace(reduced, cells=tuple(merged(c) for c in cells), constant=constant)
+        if few:
+            return reduced
     return reduced
 
 
@@ -77,7 +80,10 @@ def dominated(potentials: Potentials) -> Bool:
 
 def merged(cells: Cells) -> Cells:
     """Equal cells made one, amounts that cancel left out."""
-    order = order_of(cells)
+    key = _key(cells)
+    if key is not None and (np.diff(key) > 0).all() and (cells.amount != 0).all():
+        return cells
+    order = _lexical(cells) if key is None else np.argsort(key, kind="stable")
     scope, value, amount = cells.scope[order], cells.value[order], cells.amount[order]
     new = np.ones(len(order), np.bool_)
     new[1:] = (scope[1:] != scope[:-1]).any(axis=1) | (value[1:] != value[:-1]).any(axis=1)
@@ -87,13 +93,18 @@ def merged(cells: Cells) -> Cells:
     return Cells(scope[first[keep]], value[first[keep]], total[keep])
 
 
-def order_of(cells: Cells) -> Int64:
+def _lexical(cells: Cells) -> Int64:
     """An order in which equal cells are neighbours."""
-    columns: Sequence[Int64] = [*cells.scope.T.astype(np.int64), *cells.value.T.astype(np.int64)]
-    widths = [int(c.max(initial=0)) + 1 for c in columns]
-    if np.sum(np.log2(widths)) > 62:
-        return np.lexsort(tuple(columns[::-1]))
+    return np.lexsort((*cells.value.T[::-1], *cells.scope.T[::-1]))
+
+
+def _key(cells: Cells) -> Int64 | None:
+    """A number for each cell, the same for equal ones only; None if that takes more than 62 bits."""
+    n, k = int(cells.scope.max(initial=0)) + 1, int(cells.value.max(initial=0)) + 1
+    if cells.scope.shape[1] * np.log2(float(n) * k) > 62:
+        return None
     key = np.zeros(len(cells.amount), np.int64)
-    for column, width in zip(columns, widths, strict=True):
-        key = key * width + column
-    return np.argsort(key, kind="stable")
+    for column, width in [*((c, n) for c in cells.scope.T), *((c, k) for c in cells.value.T)]:
+        key *= width
+        key += column
+    return key

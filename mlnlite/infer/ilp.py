@@ -28,7 +28,7 @@ FOREVER = Deadline()
 
 
 @dataclass(slots=True)
-class _Program:
+class Program:
     """A program under construction: minimise the costs of columns so that rows stay within their limits."""
 
     cost: list[Float]
@@ -43,7 +43,7 @@ class _Program:
 
 
 @dataclass(frozen=True, slots=True)
-class _Columns:
+class Columns:
     """The literal `variable = value` is `sign * column + add`: its column is `first[variable] + value` for blocks.
 
     Attributes:
@@ -69,22 +69,22 @@ def solve_part(
         gap: stop when no world can be better than this share of the cost of the best one.
         start: shape (n,), a world to start from.
     """
-    program, columns = _program(part)
+    program, columns = program_of(part)
     solver = highspy.Highs()  # type: ignore[no-untyped-call]
     options = {"output_flag": False, "random_seed": seed, "threads": 1, "mip_rel_gap": gap, "mip_abs_gap": _ABSOLUTE}
     for name, setting in options.items():
         solver.setOptionValue(name, setting)
     if np.isfinite(deadline.left):
         solver.setOptionValue("time_limit", max(0.1, deadline.left))
-    solver.passModel(_model(program, columns.n))
+    solver.passModel(model_of(program, columns.n))
     if start is not None:
         _start(solver, columns, start)
-    _stop_with(solver, deadline)
+    stop_with(solver, deadline)
     solver.run()
     return _answer(solver, columns, part)
 
 
-def _stop_with(solver: highspy.Highs, deadline: Deadline) -> None:
+def stop_with(solver: highspy.Highs, deadline: Deadline) -> None:
     """Lets the user interrupt the solver."""
 
     def interrupt(event: highspy.highs.HighsCallbackEvent) -> None:
@@ -95,12 +95,12 @@ def _stop_with(solver: highspy.Highs, deadline: Deadline) -> None:
     solver.cbSimplexInterrupt += interrupt
 
 
-def _program(part: Part) -> tuple[_Program, _Columns]:
+def program_of(part: Part) -> tuple[Program, Columns]:
     """The program of a component; what it minimises is the log-weight of all gains less that of the world."""
     binary = part.cardinality == 2
     width = np.where(binary, 1, part.cardinality).astype(np.int64)
-    columns = _Columns(np.cumsum(width) - width, binary, int(width.sum()))
-    program = _Program([np.zeros(columns.n)], [np.ones(columns.n)], columns.n, offset=all_gains(part))
+    columns = Columns(np.cumsum(width) - width, binary, int(width.sum()))
+    program = Program([np.zeros(columns.n)], [np.ones(columns.n)], columns.n, offset=all_gains(part))
     _add_blocks(program, columns, part)
     for cells in part.cells:
         for rest in _without_cliques(program, columns, cells):
@@ -108,14 +108,14 @@ def _program(part: Part) -> tuple[_Program, _Columns]:
     return program, columns
 
 
-def _start(solver: highspy.Highs, columns: _Columns, world: Int64) -> None:
+def _start(solver: highspy.Highs, columns: Columns, world: Int64) -> None:
     """Hands over a world as values of the integer columns; the solver finds those of the others."""
     values = np.zeros(columns.n)
     values[np.where(columns.binary, columns.first, columns.first + world)] = np.where(columns.binary, world, 1.0)
     solver.setSolution(columns.n, np.arange(columns.n, dtype=np.int32), values)
 
 
-def _answer(solver: highspy.Highs, columns: _Columns, part: Part) -> PartAnswer:
+def _answer(solver: highspy.Highs, columns: Columns, part: Part) -> PartAnswer:
     """Reads the solution."""
     info, status, highest = solver.getInfo(), solver.getModelStatus(), all_gains(part)
     bound = highest - info.mip_dual_bound + _ABSOLUTE + _RELATIVE * abs(info.mip_dual_bound)
@@ -123,10 +123,10 @@ def _answer(solver: highspy.Highs, columns: _Columns, part: Part) -> PartAnswer:
         return PartAnswer(None, min(bound, highest), False, ILP)
     x = np.array(solver.getSolution().col_value)[: columns.n]
     proved = status == highspy.HighsModelStatus.kOptimal and info.mip_gap <= _RELATIVE
-    return PartAnswer(_world(part, columns, x), min(bound, highest), proved, ILP)
+    return PartAnswer(world_of(part, columns, x), min(bound, highest), proved, ILP)
 
 
-def _world(part: Part, columns: _Columns, x: Float) -> Int64:
+def world_of(part: Part, columns: Columns, x: Float) -> Int64:
     """The world of a solution."""
     world = np.where(columns.binary, x[columns.first] > 0.5, 0).astype(np.int64)
     for v in np.flatnonzero(~columns.binary).tolist():
@@ -135,7 +135,7 @@ def _world(part: Part, columns: _Columns, x: Float) -> Int64:
     return world
 
 
-def _literals(columns: _Columns, scope: Int64, value: Int64) -> tuple[Int64, Float, Float]:
+def _literals(columns: Columns, scope: Int64, value: Int64) -> tuple[Int64, Float, Float]:
     """Column, sign and constant of literals `variable = value`."""
     binary = columns.binary[scope]
     column = columns.first[scope] + np.where(binary, 0, value)
@@ -143,7 +143,7 @@ def _literals(columns: _Columns, scope: Int64, value: Int64) -> tuple[Int64, Flo
     return column, sign, np.where(sign < 0, 1.0, 0.0)
 
 
-def _add_rows(program: _Program, column: Int64, value: Float, limit: Float) -> None:
+def _add_rows(program: Program, column: Int64, value: Float, limit: Float) -> None:
     """Adds rows `sum value * column <= limit`; shapes (n, k), (n, k), (n,)."""
     n, k = column.shape
     program.row.append(np.repeat(np.arange(program.n_rows, program.n_rows + n), k))
@@ -153,7 +153,7 @@ def _add_rows(program: _Program, column: Int64, value: Float, limit: Float) -> N
     program.n_rows += n
 
 
-def _add_columns(program: _Program, cost: Float, upper: float) -> Int64:
+def _add_columns(program: Program, cost: Float, upper: float) -> Int64:
     """Adds columns between 0 and `upper`; returns their numbers."""
     program.cost.append(cost)
     program.upper.append(np.full(len(cost), upper))
@@ -161,7 +161,7 @@ def _add_columns(program: _Program, cost: Float, upper: float) -> Int64:
     return np.arange(program.n_columns - len(cost), program.n_columns)
 
 
-def _add_blocks(program: _Program, columns: _Columns, part: Part) -> None:
+def _add_blocks(program: Program, columns: Columns, part: Part) -> None:
     """One value for each block."""
     for v in np.flatnonzero(~columns.binary).tolist():
         own = columns.first[v] + np.arange(part.cardinality[v])[None]
@@ -169,7 +169,7 @@ def _add_blocks(program: _Program, columns: _Columns, part: Part) -> None:
             _add_rows(program, own, np.full(own.shape, sign), np.array([sign]))
 
 
-def _add_cells(program: _Program, columns: _Columns, cells: Cells) -> None:
+def _add_cells(program: Program, columns: Columns, cells: Cells) -> None:
     """Cells of one arity."""
     column, sign, add = _literals(columns, cells.scope.astype(np.int64), cells.value.astype(np.int64))
     room = column.shape[1] - 1 - add.sum(axis=1)
@@ -190,7 +190,7 @@ def _add_cells(program: _Program, columns: _Columns, cells: Cells) -> None:
         _add_rows(program, pair, np.stack([np.ones(len(extra)), -sign[pays, c]], axis=1), add[pays, c])
 
 
-def _without_cliques(program: _Program, columns: _Columns, cells: Cells) -> Iterator[Cells]:
+def _without_cliques(program: Program, columns: Columns, cells: Cells) -> Iterator[Cells]:
     """Turns cells that cost the same for every two of some literals into counts; passes on the other cells."""
     if cells.scope.shape[1] != 2:
         yield cells
@@ -217,7 +217,7 @@ def _cliques(ends: Int64) -> Iterator[tuple[Int64, Int64]]:
         yield np.flatnonzero(label[start] == c), nodes[label == c]
 
 
-def _add_count(program: _Program, literals: tuple[Int64, Float, Float], amount: float) -> None:
+def _add_count(program: Program, literals: tuple[Int64, Float, Float], amount: float) -> None:
     """Cost of each pair of literals that hold, `c k (k - 1) / 2` for k of them: number j + 1 of them costs `c j`."""
     column, sign, add = literals
     n = len(column)
@@ -229,7 +229,7 @@ def _add_count(program: _Program, literals: tuple[Int64, Float, Float], amount: 
     _add_rows(program, row, np.concatenate([sign, -np.ones(n - 1)])[None], np.array([1.0 - add.sum()]))
 
 
-def _model(program: _Program, n_integer: int) -> highspy.HighsLp:
+def model_of(program: Program, n_integer: int) -> highspy.HighsLp:
     """The program as HiGHS takes it."""
     model = highspy.HighsLp()
     shape = program.n_rows, program.n_columns

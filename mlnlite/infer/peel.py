@@ -65,10 +65,13 @@ def peel(potentials: Potentials, *, maximise: bool, fewest: int = FEWEST) -> tup
     pairs = next((c for c in potentials.cells if c.scope.shape[1] == 2), None)
     if pairs is None or len(pairs.amount) < fewest:
         return potentials, ()
-    names, pair = np.unique(pairs.scope, axis=0, return_inverse=True)
-    rounds = _rounds(potentials, names.astype(np.int64), fewest)
-    order = np.argsort(pair.ravel(), kind="stable")
-    starts = np.searchsorted(pair.ravel()[order], np.arange(len(names) + 1))
+    n = len(potentials.cardinality)
+    key = pairs.scope[:, 0].astype(np.int64) * n + pairs.scope[:, 1]
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.diff(key[order], prepend=-1))
+    names = np.stack(np.divmod(key[order][first], n), axis=1)
+    rounds = _rounds(potentials, names, fewest)
+    starts = np.append(first, len(key))
     sorted_cells = Cells(pairs.scope[order], pairs.value[order], pairs.amount[order])
     start, single = _single(potentials)
     leaves: list[Leaves] = []

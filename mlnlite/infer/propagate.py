@@ -90,8 +90,11 @@ def _shortened(cells: Cells, known: _Known) -> tuple[list[Cells], float]:
     """Cells that can still hold, without the literals that always do."""
     flat = known.start[cells.scope] + cells.value
     alive = ~known.forbidden[flat].any(axis=1)
-    scope = np.where(known.fixed[cells.scope], -1, cells.scope)[alive]
-    return gather(scope.astype(np.int32), cells.value[alive], cells.amount[alive])
+    shorter = known.fixed[cells.scope].any(axis=1)
+    same, rows = _pick(cells, alive & ~shorter), np.flatnonzero(alive & shorter)
+    scope = np.where(known.fixed[cells.scope[rows]], -1, cells.scope[rows])
+    found, gain = gather(scope.astype(np.int32), cells.value[rows], cells.amount[rows])
+    return [c for c in (same, *found) if len(c.amount)], gain
 
 
 def _pick(cells: Cells, which: Bool) -> Cells:

@@ -5,16 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import Literal
+from typing import Literal, TypedDict, get_args
 
-from mlnlite.infer import ilp, toulbar2
+from mlnlite.errors import QueryMistake
+from mlnlite.ground.network import Int64
+from mlnlite.infer import annealing, ilp, maxsat, mincut, relaxation, toulbar2, walksat
 from mlnlite.infer.deadline import Deadline
-from mlnlite.infer.parts import Part, PartAnswer
+from mlnlite.infer.parts import Part, PartAnswer, all_gains, value_of
 from mlnlite.infer.workers import Ask, workers
 
-Method = Literal["auto", "ve", "wcsp", "ilp"]
+Method = Literal["auto", "ve", "mincut", "ilp", "wcsp", "maxsat", "annealing", "maxwalksat"]
+METHODS: tuple[Method, ...] = get_args(Method)
 _FIRST_TRY = 5.0
-_SMALL = 400
+_FEW, _MANY, _TOO_MANY = 400, 20_000, 3_000_000
+
+
+class Search(TypedDict, total=False):
+    """Options of a search for a most probable world, see `map.map_of`."""
+
+    method: Method
+    time_limit: float | None
+    seed: int
+    gap: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +46,8 @@ class Options:
     gap: float = 0.0
 
 
-Rung = Callable[[Part, Deadline, list[PartAnswer]], PartAnswer]
+Rung = Callable[[Part, Deadline, list[PartAnswer]], PartAnswer | None]
+"""Answers a component, given what others said of it; None if it is not of a kind that the rung can answer."""
 
 
 def answers_of(parts: Sequence[Part], options: Options) -> Iterator[list[PartAnswer]]:
@@ -61,27 +74,89 @@ def _identity(part: Part) -> object:
 
 
 def _search(part: Part, options: Options, deadline: Deadline, ask: Ask) -> list[PartAnswer]:
-    """Climbs until something is proved."""
+    """Climbs until something is proved, or good enough."""
     answers: list[PartAnswer] = []
     for rung, seconds in _ladder(part, options, ask):
-        answers.append(rung(part, deadline.within(seconds), answers))
-        if answers[-1].optimal or deadline.is_over:
+        answer = rung(part, deadline.within(seconds), answers)
+        answers += [] if answer is None else [answer]
+        if deadline.is_over or any(a.optimal for a in answers) or _is_close(part, answers, options.gap):
             break
     return answers
 
 
+def _is_close(part: Part, answers: list[PartAnswer], gap: float) -> bool:
+    """Whether the best world so far costs at most a share more than any other can."""
+    values = [value_of(part, a.world) for a in answers if a.world is not None]
+    if not values or gap <= 0:
+        return False
+    highest, bound = all_gains(part), min(a.bound for a in answers)
+    return bound - max(values) <= gap * (highest - max(values))
+
+
+def best_of(part: Part, answers: list[PartAnswer]) -> Int64 | None:
+    """The best world that was found."""
+    worlds = [a.world for a in answers if a.world is not None]
+    return max(worlds, key=lambda world: value_of(part, world), default=None)
+
+
 def _ladder(part: Part, options: Options, ask: Ask) -> list[tuple[Rung, float]]:
     """Rungs in the order to try them, and how long each may take [s]."""
+    single = _single(options, ask)
+    if options.method in single:
+        return single[options.method]
+    by_ilp, by_wcsp, by_annealing = single["ilp"][0][0], single["wcsp"][0][0], single["annealing"][0][0]
+    n_cells = sum(len(c.amount) for c in part.cells)
+    steps: list[tuple[Rung, float]] = [(_by_mincut, inf)]
+    if n_cells > _TOO_MANY:
+        return [*steps, *single["annealing"]]
+    tried = [(by_wcsp, _FIRST_TRY)] if toulbar2.is_available() else []
+    mixed = (part.cardinality > 2).any() or max(c.scope.shape[1] for c in part.cells) == 3
+    if len(part.variables) <= _FEW and mixed:
+        return [*steps, *tried, (by_annealing, inf), (by_ilp, inf)]
+    relaxed: list[tuple[Rung, float]] = [(_by_relaxation, 4 * _FIRST_TRY)] if n_cells > _MANY else []
+    return [*steps, *relaxed, (by_ilp, _FIRST_TRY), *tried, (by_annealing, inf), (by_ilp, inf)]
 
-    def by_ilp(part: Part, deadline: Deadline, _: list[PartAnswer]) -> PartAnswer:
-        return ilp.solve_part(part, deadline, options.seed, gap=options.gap)
+
+def _single(options: Options, ask: Ask) -> dict[str, list[tuple[Rung, float]]]:
+    """What each method does by itself; searches without a proof get the bound of the linear relaxation."""
+    seed = options.seed
+
+    def by_ilp(part: Part, deadline: Deadline, before: list[PartAnswer]) -> PartAnswer:
+        return ilp.solve_part(part, deadline, seed, gap=options.gap, start=best_of(part, before))
 
     def by_wcsp(part: Part, deadline: Deadline, _: list[PartAnswer]) -> PartAnswer:
-        return toulbar2.solve_part(part, ask, deadline, options.seed)
+        return toulbar2.solve_part(part, ask, deadline, seed)
 
-    single: dict[str, Rung] = {"ilp": by_ilp, "wcsp": by_wcsp}
-    if options.method in single:
-        return [(single[options.method], inf)]
-    if not toulbar2.is_available():
-        return [(by_ilp, inf)]
-    return [(by_ilp, _FIRST_TRY), (by_wcsp, _FIRST_TRY), (by_ilp, inf)]
+    def by_maxsat(part: Part, deadline: Deadline, _: list[PartAnswer]) -> PartAnswer:
+        return maxsat.solve_part(part, ask, deadline)
+
+    def by_annealing(part: Part, deadline: Deadline, before: list[PartAnswer]) -> PartAnswer:
+        return annealing.solve_part(part, deadline, seed, start=best_of(part, before))
+
+    def by_walksat(part: Part, deadline: Deadline, _: list[PartAnswer]) -> PartAnswer:
+        return walksat.solve_part(part, deadline, seed)
+
+    return {
+        "ilp": [(by_ilp, inf)],
+        "wcsp": [(by_wcsp, inf)],
+        "maxsat": [(by_maxsat, inf)],
+        "mincut": [(_only_mincut, inf)],
+        "annealing": [(by_annealing, inf), (_by_relaxation, _FIRST_TRY)],
+        "maxwalksat": [(by_walksat, inf), (_by_relaxation, _FIRST_TRY)],
+    }
+
+
+def _by_mincut(part: Part, _: Deadline, __: list[PartAnswer]) -> PartAnswer | None:
+    return mincut.solve_part(part)
+
+
+def _only_mincut(part: Part, _: Deadline, __: list[PartAnswer]) -> PartAnswer:
+    answer = mincut.solve_part(part)
+    if answer is None:
+        hint = "try `auto`: it uses minimum cuts where they apply"
+        raise QueryMistake("minimum cuts need formulas over pairs of atoms that attract, once some are negated", hint)
+    return answer
+
+
+def _by_relaxation(part: Part, deadline: Deadline, _: list[PartAnswer]) -> PartAnswer:
+    return relaxation.solve_part(part, deadline)

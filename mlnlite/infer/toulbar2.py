@@ -53,7 +53,7 @@ def solve_part(part: Part, ask: Ask, deadline: Deadline, seed: int = 0) -> PartA
 
 def _problem(part: Part) -> tuple[dict[str, object], float, float]:
     """A component as the worker reads it, the scale of its costs, and the largest error that rounding makes."""
-    merged = [_merged(c) for c in part.cells]
+    merged = [_merged(c) for c in part.cells if len(c.amount)]
     amounts = np.concatenate([m.amount[np.isfinite(m.amount)] for m in merged] or [np.zeros(0)])
     digits = min(_FINEST, int(np.floor(np.log10(_LARGEST_COST / max(1.0, float(np.abs(amounts).sum()))))))
     scale = 10.0**digits

@@ -6,10 +6,11 @@ Some solvers hold the interpreter lock, keep options in globals or cannot be sto
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Timer
 from typing import Any, TypeAlias
@@ -28,6 +29,7 @@ def workers() -> Iterator[Ask]:
     def ask(name: str, problem: dict[str, Any], seconds: float) -> dict[str, Any] | None:
         process = running.get(name)
         if process is None or process.poll() is not None:
+            _end(process)
             process = running[name] = _started(name)
         return _asked(process, problem, seconds)
 
@@ -35,15 +37,26 @@ def workers() -> Iterator[Ask]:
         yield ask
     finally:
         for process in running.values():
-            process.kill()
-            process.communicate()
+            _end(process)
+
+
+def _end(process: subprocess.Popen[str] | None) -> None:
+    """Ends a worker, and forgets what was still on its way to it."""
+    if process is None:
+        return
+    process.kill()
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        assert pipe is not None
+        with suppress(BrokenPipeError):
+            pipe.close()
 
 
 def _started(name: str) -> subprocess.Popen[str]:
     """A running worker."""
     command = [sys.executable, "-P", str(Path(__file__).with_name(f"{name}.py"))]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
+    pipe, environment = subprocess.PIPE, {**os.environ, "PYTHONHASHSEED": "0"}
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True, env=environment)
 
 
 def _asked(process: subprocess.Popen[str], problem: dict[str, Any], seconds: float) -> dict[str, Any] | None:

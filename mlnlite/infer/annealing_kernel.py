@@ -1,0 +1,54 @@
+"""Sweeps of simulated annealing over variables of any number of values, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def sweeps(start, begin, cell, amount, missing, world, best, temperatures, value, top, rng):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, PLR0913
+    """As many moves as there are variables at each temperature; returns the value of `world` and that of `best`.
+
+    Args:
+        start: as in `Landscape`; likewise `begin`, `cell`, `amount`.
+        begin: see there.
+        cell: see there.
+        amount: see there.
+        missing: shape (n_cells,), literals of each cell that do not hold; kept up to date.
+        world: shape (n,), changed in place.
+        best: shape (n,), the best world so far.
+        temperatures: shape (n_sweeps,).
+        value: of `world`.
+        top: value of `best`.
+        rng: where chance comes from.
+    """
+    n = len(world)
+    for temperature in temperatures:
+        for _ in range(n):
+            v = int(rng.random() * n)
+            size = start[v + 1] - start[v]
+            if size < 2:
+                continue
+            old = world[v]
+            new = int(rng.random() * (size - 1))
+            new += new >= old
+            gain = 0.0
+            for i in range(begin[start[v] + new], begin[start[v] + new + 1]):
+                if missing[cell[i]] == 1:
+                    gain += amount[cell[i]]
+            for i in range(begin[start[v] + old], begin[start[v] + old + 1]):
+                if missing[cell[i]] == 0:
+                    gain -= amount[cell[i]]
+            if gain < 0 and rng.random() >= np.exp(gain / temperature):
+                continue
+            for i in range(begin[start[v] + new], begin[start[v] + new + 1]):
+                missing[cell[i]] -= 1
+            for i in range(begin[start[v] + old], begin[start[v] + old + 1]):
+                missing[cell[i]] += 1
+            world[v] = new
+            value += gain
+        if value > top:
+            top = value
+            best[:] = world
+    return value, top

@@ -1,0 +1,64 @@
+"""Bounds by linear programming (HiGHS): comes in a component, goes out a bound, and a world if the answer is integral.
+
+The bound is worked out from the multipliers of the rows in plain NumPy (weak duality), so it holds even if the solver
+stopped early or was wrong.
+"""
+
+from __future__ import annotations
+
+import highspy
+import numpy as np
+from scipy.sparse import csr_array
+
+from mlnlite.ground.network import Float
+from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.ilp import Program, model_of, program_of, stop_with, world_of
+from mlnlite.infer.parts import Part, PartAnswer, all_gains, value_of
+
+RELAXATION = "lp"
+_CLOSE = 1e-7
+FOREVER = Deadline()
+
+
+def solve_part(part: Part, deadline: Deadline = FOREVER, solver_name: str = "ipm") -> PartAnswer:
+    """Solves the linear relaxation of a component.
+
+    Args:
+        part: the component.
+        deadline: when to stop.
+        solver_name: "simplex", "ipm" or "pdlp".
+    """
+    program, columns = program_of(part)
+    solver = highspy.Highs()  # type: ignore[no-untyped-call]
+    for name, setting in (("output_flag", False), ("threads", 1), ("solver", solver_name)):
+        solver.setOptionValue(name, setting)
+    if np.isfinite(deadline.left):
+        solver.setOptionValue("time_limit", max(0.1, deadline.left))
+    model = model_of(program, 0)
+    solver.passModel(model)
+    stop_with(solver, deadline)
+    solver.run()
+    found = solver.getSolution()
+    multipliers = np.array(found.row_dual) if found.dual_valid else np.zeros(program.n_rows)
+    bound = bound_of(part, program, multipliers)
+    world = world_of(part, columns, np.array(found.col_value)[: columns.n]) if found.value_valid else None
+    value = -np.inf if world is None else value_of(part, world)
+    if not np.isfinite(value):
+        return PartAnswer(None, bound, False, RELAXATION)
+    return PartAnswer(world, bound, bound - value <= _CLOSE * max(1.0, abs(value)), RELAXATION)
+
+
+def bound_of(part: Part, program: Program, multipliers: Float) -> float:
+    """What no world of a component can pass, by any multipliers of the rows `A x <= b` (those above 0 count as 0).
+
+    `min c x >= y b + min (c - A' y) x` for `y <= 0`, and the last part is taken column by column within its limits.
+    """
+    model = model_of(program, 0)
+    shape = program.n_rows, program.n_columns
+    entries = (np.array(model.a_matrix_.value_), np.array(model.a_matrix_.index_), np.array(model.a_matrix_.start_))
+    matrix = csr_array(entries, shape=shape)
+    y = np.minimum(multipliers, 0.0)
+    reduced = np.array(model.col_cost_) - matrix.T @ y
+    columns = np.minimum(0.0, reduced) * np.array(model.col_upper_)
+    least = float(y @ np.array(model.row_upper_) + columns.sum() + model.offset_)
+    return all_gains(part) - least
