@@ -20,11 +20,13 @@ class ClauseFactor:
         literals: `a + 1` or `-(a + 1)`.
         gain: weight times count, negative for a conjunction seen as a negated clause.
         weight: index of its weight.
+        constant: what every world gains besides: a conjunction gains its weight unless its negated clause is true.
     """
 
     literals: tuple[int, ...]
     gain: float
     weight: int
+    constant: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,8 @@ def clause_factors(network: Network) -> Iterator[ClauseFactor]:
         rows = zip(block.literals.tolist(), gain.tolist(), block.weight.tolist(), strict=True)
         for literals, value, weight in rows:
             if value != 0:
-                yield ClauseFactor(tuple(literals), value, weight)
+                constant = -value if block.negated and np.isfinite(value) else 0.0
+                yield ClauseFactor(tuple(literals), value, weight, constant)
 
 
 def table_factors(network: Network) -> Iterator[TableFactor]:

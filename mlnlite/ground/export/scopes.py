@@ -28,7 +28,7 @@ def log_tables(network: Network) -> Iterator[tuple[tuple[int, ...], NDArray[np.f
         true = np.zeros(_shape(network, scope), np.bool_)
         for column, sign in zip(holds, signs, strict=True):
             true = true | (column == sign)
-        yield scope, _gains(true, factor.gain)
+        yield scope, _gains(true, factor.gain) + factor.constant
     for table in table_factors(network):
         scope, holds = _columns(network, table.atoms)
         index = tuple(np.broadcast_to(h, _shape(network, scope)).astype(np.int64) for h in holds)
