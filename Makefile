@@ -25,7 +25,7 @@ demo: $(VENV)/.installed  ## learn the example model, then ask it
 	@echo "The learnt model is $(OUT)/handover.mln; what it was learnt from and asked about is in $(EXAMPLES)/."
 
 test: $(VENV)/.installed-dev  ## run all tests
-	$(BIN)/python -m pytest -q $(ARGS)
+	$(BIN)/python -m pytest -q -n auto $(ARGS)
 
 lint: $(VENV)/.installed-dev  ## format check, lint, types, import contract
 	$(BIN)/ruff format --check $(CODE)
