@@ -34,9 +34,22 @@ if TYPE_CHECKING:
     from mlnlite.infer.scored import score as score
     from mlnlite.infer.session import Session as Session
     from mlnlite.infer.session import compile as compile
+    from mlnlite.learn.advice import advice as advice
+    from mlnlite.learn.crossvalidate import CrossValidation as CrossValidation
+    from mlnlite.learn.crossvalidate import Split as Split
+    from mlnlite.learn.crossvalidate import Training as Training
+    from mlnlite.learn.crossvalidate import crossvalidate as crossvalidate
+    from mlnlite.learn.effects import effects as effects
+    from mlnlite.learn.effects import held_out as held_out
     from mlnlite.learn.evaluate import Evaluation as Evaluation
     from mlnlite.learn.evaluate import evaluate as evaluate
     from mlnlite.learn.learned import LearnedModel as LearnedModel
+    from mlnlite.learn.prior import Cauchy as Cauchy
+    from mlnlite.learn.prior import Gaussian as Gaussian
+    from mlnlite.learn.prior import Hierarchical as Hierarchical
+    from mlnlite.learn.prior import Laplace as Laplace
+    from mlnlite.learn.uncertainty import Uncertainty as Uncertainty
+    from mlnlite.learn.uncertainty import uncertainty as uncertainty
     from mlnlite.learn.weights import learn as learn
     from mlnlite.model.evidence import Evidence as Evidence
     from mlnlite.model.facts import closed as closed
@@ -64,6 +77,19 @@ _HOMES = {
     "score": "mlnlite.infer.scored",
     "Session": "mlnlite.infer.session",
     "compile": "mlnlite.infer.session",
+    "advice": "mlnlite.learn.advice",
+    "CrossValidation": "mlnlite.learn.crossvalidate",
+    "Split": "mlnlite.learn.crossvalidate",
+    "Training": "mlnlite.learn.crossvalidate",
+    "crossvalidate": "mlnlite.learn.crossvalidate",
+    "effects": "mlnlite.learn.effects",
+    "held_out": "mlnlite.learn.effects",
+    "Cauchy": "mlnlite.learn.prior",
+    "Gaussian": "mlnlite.learn.prior",
+    "Hierarchical": "mlnlite.learn.prior",
+    "Laplace": "mlnlite.learn.prior",
+    "Uncertainty": "mlnlite.learn.uncertainty",
+    "uncertainty": "mlnlite.learn.uncertainty",
     "Evaluation": "mlnlite.learn.evaluate",
     "evaluate": "mlnlite.learn.evaluate",
     "LearnedModel": "mlnlite.learn.learned",

@@ -39,7 +39,7 @@ def run_python(text, names):
         return
     test = doctest.DocTestParser().get_doctest(text, names, "example", None, 0)
     report = []
-    doctest.DocTestRunner(optionflags=doctest.ELLIPSIS, verbose=False).run(test, report.append, clear_globs=False)
+    doctest.DocTestRunner(optionflags=doctest.ELLIPSIS, verbose=False).run(test, out=report.append, clear_globs=False)
     names.update(test.globs)
     assert not report, "".join(report)
 

@@ -20,6 +20,7 @@ COMMANDS = {
     "ground": "Ground a model: what evidence leaves open, or what that would take; export it.",
     "score": "Score a world: its log-weight and what it pays, formula by formula.",
     "evaluate": "Measure how well a model predicts what databases already say.",
+    "crossvalidate": "Measure how well a model predicts databases that it was not learnt from.",
 }
 """The built-in commands with a line each; `mlnlite.cli.NAME` is imported when NAME is asked for."""
 

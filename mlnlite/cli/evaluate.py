@@ -32,6 +32,7 @@ class _Options(TypedDict):
     query: tuple[str, ...]
     closed_world: tuple[str, ...]
     open_world: tuple[str, ...]
+    calibration: bool
     output: Path | None
     dialect: Dialect | None
     format: Literal["text", "json"]
@@ -45,6 +46,7 @@ class _Options(TypedDict):
 )
 @closed_world_option
 @open_world_option
+@click.option("--calibration", is_flag=True, help="Also plot how often what is said is so.")
 @output_option
 @dialect_option
 @format_option("text", "json")
@@ -69,4 +71,8 @@ def evaluate(**options: Unpack[_Options]) -> None:
     closed = closed_world(model, labels, names(options["closed_world"]) or ["all"], names(options["open_world"]))
     with working("inferring"):
         found = ml.evaluate(model, evidence, predicates=labels, closed_world=closed)
-    emit(found.to_json() if options["format"] == "json" else str(found), options["output"])
+    if options["format"] == "json":
+        emit(found.to_json(), options["output"])
+        return
+    plots = [f"\n{s.predicate}\n{s.calibration}" for s in found.scores] if options["calibration"] else []
+    emit("\n".join([str(found), *plots]), options["output"])

@@ -6,21 +6,20 @@ import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
 import click
 
 from mlnlite import __version__
 from mlnlite.cli.files import write_whole
-from mlnlite.cli.options import FILE, dialect_option, format_option, names, output_option, time_limit_option
+from mlnlite.cli.learning import learning_options, prior_of, split_files
+from mlnlite.cli.options import dialect_option, format_option, names, output_option, time_limit_option
 from mlnlite.cli.terminal import working
-from mlnlite.errors import MlnError
 
 if TYPE_CHECKING:
-    from mlnlite.learn.learned import LearnedModel
+    from mlnlite.learn.learned import LearnedModel, Objective
+    from mlnlite.learn.report import Report
     from mlnlite.syntax.tree import Dialect
-
-DEFAULT_SD = 5.0
 
 
 class _Options(TypedDict):
@@ -28,9 +27,13 @@ class _Options(TypedDict):
     model: tuple[Path, ...]
     database: tuple[Path, ...]
     output: Path | None
+    objective: Objective
+    open_predicates: tuple[str, ...]
     prior_sd: float | None
     prior: str
     predict: tuple[str, ...]
+    report: Literal["sandwich", "information", "bootstrap"] | None
+    seed: int
     time_limit: float | None
     dialect: Dialect | None
     format: str
@@ -43,33 +46,26 @@ class _Inputs:
 
 
 @click.command()
-@click.argument("files", type=FILE, nargs=-1, metavar="MODEL... DATABASE...")
-@click.option("-m", "--model", type=FILE, multiple=True, metavar="FILE", help="A model file, whatever its name.")
-@click.option("-d", "--database", type=FILE, multiple=True, metavar="FILE", help="A database file, whatever its name.")
+@learning_options
 @output_option
-@click.option(
-    "--prior-sd",
-    type=click.FloatRange(min=0, min_open=True),
-    metavar="S",
-    help=f"Standard deviation of the Gaussian prior (mean 0) of each weight. By default {DEFAULT_SD:g}.",
-)
-@click.option(
-    "--prior",
-    type=click.Choice(["gaussian", "none"]),
-    default="gaussian",
-    help="`none`: weights that the data push to infinity are reported, and clipped.",
-)
 @click.option(
     "--predict",
     multiple=True,
     metavar="NAMES",
-    help="Predicates to predict from the others (conditional pseudo-likelihood). By default all.",
+    help="Predicates to predict from the others (conditional likelihoods). By default all.",
 )
+@click.option(
+    "--report",
+    type=click.Choice(["sandwich", "information", "bootstrap"]),
+    help="Also say how sure each weight is, from clusters of the data, the curvature, or simulated data; and which "
+    "weights not to trust.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
 @time_limit_option("Stop after this long, with the best weights so far.")
 @dialect_option
 @format_option("text", "json")
 def learn(**options: Unpack[_Options]) -> None:
-    """Learn the weights of a model from databases, by pseudo-likelihood.
+    """Learn the weights of a model from databases, by default by pseudo-likelihood.
 
     Files that end in .mln are models, the others databases; -m and -d say so for files with other names. A database is
     complete: what is not a fact is false. Databases between `---` and in several files are worlds of their own.
@@ -77,49 +73,45 @@ def learn(**options: Unpack[_Options]) -> None:
     The model is written to -o, and a summary to standard output; without -o the model is written to standard output
     and the summary to standard error.
     """
-    inputs = _inputs(options)
-    learned = _learned(inputs, options)
-    text = _header(learned, inputs) + learned_text(learned)
+    inputs = _Inputs(*split_files(options["files"], options["model"], options["database"]))
+    learned, report = _learned(inputs, options)
+    text = _header(learned, inputs, options) + learned_text(learned)
     output = options["output"]
     if output is not None:
         write_whole(output, text)
     if options["format"] == "json":
         where = {"model": text} if output is None else {"output": str(output)}
-        click.echo(json.dumps({**learned.to_dict(), **where}, indent=2))
+        more = {} if report is None else {"report": report.to_dict()}
+        click.echo(json.dumps({**learned.to_dict(), **more, **where}, indent=2))
         return
-    click.echo(str(learned), err=output is None)
+    summary = str(learned) if report is None else f"{learned}\n\n{report}\n"
+    click.echo(summary, err=output is None)
     click.echo(text if output is None else f"{'written to':<36}{output}", nl=output is not None)
 
 
-def _inputs(options: _Options) -> _Inputs:
-    """Which files are models and which are databases."""
-    files = options["files"]
-    models = tuple(f for f in files if f.suffix == ".mln") + options["model"]
-    databases = tuple(f for f in files if f.suffix != ".mln") + options["database"]
-    if not models:
-        raise MlnError("no file is a model", "a model ends in .mln; say `-m FILE` for one that does not")
-    if not databases:
-        raise MlnError("there is no database to learn from", "name one after the model; `-d FILE` if it ends in .mln")
-    return _Inputs(models, databases)
-
-
-def _learned(inputs: _Inputs, options: _Options) -> LearnedModel:
+def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report | None]:
     import mlnlite as ml
 
     with working("reading"):
         model = ml.read_model(*inputs.models, dialect=options["dialect"])
         databases = ml.read_evidence(*inputs.databases, model=model)
-    predict = names(options["predict"]) or None
     with working("learning"):
-        return ml.learn(model, databases, prior=_prior_sd(options), predict=predict, time_limit=options["time_limit"])
+        learned = ml.learn(
+            model,
+            databases,
+            objective=options["objective"],
+            predict=names(options["predict"]) or None,
+            open_predicates=names(options["open_predicates"]),
+            prior=prior_of(options["prior"], options["prior_sd"]),
+            time_limit=options["time_limit"],
+        )
+    method = options["report"]
+    if method is None:
+        return learned, None
+    from mlnlite.learn.report import report
 
-
-def _prior_sd(options: _Options) -> float | None:
-    if options["prior"] == "none":
-        if options["prior_sd"] is not None:
-            raise click.UsageError("--prior none and --prior-sd exclude each other")
-        return None
-    return options["prior_sd"] or DEFAULT_SD
+    with working("measuring"):
+        return learned, report(learned, databases, method=method, seed=options["seed"])
 
 
 def learned_text(learned: LearnedModel) -> str:
@@ -130,21 +122,35 @@ def learned_text(learned: LearnedModel) -> str:
         return ml.model_text(learned.model).rstrip("\n") + "\n"
 
 
-def _header(learned: LearnedModel, inputs: _Inputs) -> str:
-    """How the weights came about, as comments."""
-    from mlnlite.learn.prior import prior_text
+def _header(learned: LearnedModel, inputs: _Inputs, options: _Options) -> str:
+    """How the weights came about, as comments: for people, then as JSON."""
+    from mlnlite.learn.prior import prior_data, prior_text
 
+    data = {
+        "mlnlite": __version__,
+        "objective": learned.objective,
+        "value": learned.value,
+        "prior": prior_data(learned.prior),
+        "predict": learned.how.predict,
+        "open": learned.how.open_predicates,
+        "status": learned.status,
+        "iterations": learned.iterations,
+        "seed": options["seed"],
+        "models": {path.name: _hash(path) for path in inputs.models},
+        "databases": {path.name: _hash(path) for path in inputs.databases},
+    }
     lines = [
         f"learnt by mlnlite {__version__}",
         f"{learned.objective} {learned.value:.6f}",
         f"prior: {prior_text(learned.prior)}",
         f"stopped: {learned.status} after {learned.iterations} steps",
-        *(f"model: {_named(path)}" for path in inputs.models),
-        *(f"data: {_named(path)}" for path in inputs.databases),
+        *(f"model: {path.name} sha256:{_hash(path)}" for path in inputs.models),
+        *(f"data: {path.name} sha256:{_hash(path)}" for path in inputs.databases),
+        f"json: {json.dumps(data)}",
     ]
     return "".join(f"// {line}\n" for line in lines) + "\n"
 
 
-def _named(path: Path) -> str:
-    """Name and content of an input file: its SHA-256."""
-    return f"{path.name} sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}"
+def _hash(path: Path) -> str:
+    """Content of an input file: its SHA-256."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -114,19 +114,23 @@ def _sd(covariance: sparse.csr_array, learned: LearnedModel) -> Float:
 
 
 def _covariance(learned: LearnedModel, problem: Problem, method: Method) -> sparse.csr_array:
-    """Covariance of all weights, block by block."""
+    """Covariance of all weights, block by block.
+
+    The prior counts as one more observation, so that a weight that only the prior holds is as unsure as the prior.
+    """
     free = problem.free
     x = learned.weights[free]
     bend = information.hessian(problem.every, x)
     if problem.known is not None:
         bend = sparse.csr_array(bend - information.hessian(problem.known, x))
-    bend = sparse.csr_array(bend + sparse.diags_array(learned.penalty.of(free).smooth(x)[2]))
+    pull = learned.penalty.of(free).smooth(x)[2]
+    bend = sparse.csr_array(bend + sparse.diags_array(pull))
     slopes = _scores(problem, x) if method == "sandwich" else None
     rows, columns, data = [], [], []
     for block in information.blocks(bend):
         inverse = np.linalg.pinv(information.dense(bend, block), rcond=1e-12, hermitian=True)
         if slopes is not None:
-            meat = _meat(np.asarray(slopes[:, block].todense(), float))
+            meat = _meat(np.asarray(slopes[:, block].todense(), float)) + np.diag(pull[block])
             inverse = inverse @ meat @ inverse
         grid = np.meshgrid(free[block], free[block], indexing="ij")
         rows.append(grid[0].ravel())

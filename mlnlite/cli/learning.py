@@ -1,0 +1,90 @@
+"""Options that `learn` and `crossvalidate` share, and what they mean."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from mlnlite.cli.options import FILE, Command
+from mlnlite.errors import MlnError
+
+if TYPE_CHECKING:
+    from mlnlite.learn.prior import Prior
+
+DEFAULT_SD = 5.0
+
+
+def learning_options(command: Command) -> Command:
+    """Model and database files, objective, open predicates and prior."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+_OPTIONS = (
+    click.argument("files", type=FILE, nargs=-1, metavar="MODEL... DATABASE..."),
+    click.option("-m", "--model", type=FILE, multiple=True, metavar="FILE", help="A model file, whatever its name."),
+    click.option("-d", "--database", type=FILE, multiple=True, metavar="FILE", help="A database, whatever its name."),
+    click.option(
+        "--objective",
+        type=click.Choice(["pseudo-likelihood", "likelihood", "composite"]),
+        default="pseudo-likelihood",
+        show_default=True,
+        help="`likelihood`: of all that is predicted, exactly; `composite`: of pairs of atoms that share a formula.",
+    ),
+    click.option(
+        "--open",
+        "open_predicates",
+        multiple=True,
+        metavar="NAMES",
+        help="Predicates whose atoms are unknown where they are not facts; needs `--objective likelihood`.",
+    ),
+    click.option(
+        "--prior",
+        type=click.Choice(["gaussian", "laplace", "cauchy", "hierarchical", "none"]),
+        default="gaussian",
+        show_default=True,
+        help="`laplace`: exact zeros; `hierarchical`: rows of a `+` template share a learnt mean and spread; `none`: "
+        "weights that the data push to infinity are reported, and clipped.",
+    ),
+    click.option(
+        "--prior-sd",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="S",
+        help="Standard deviation, or scale, of the prior (mean 0). By default 5; Laplace 1, Cauchy 2.5.",
+    ),
+)
+
+
+def prior_of(family: str, sd: float | None) -> Prior | None:
+    """The prior that the options mean."""
+    from mlnlite.learn.prior import Cauchy, Gaussian, Hierarchical, Laplace
+
+    if family == "none":
+        if sd is not None:
+            raise click.UsageError("--prior none and --prior-sd exclude each other")
+        return None
+    if family == "laplace":
+        return Laplace(sd or 1.0)
+    if family == "cauchy":
+        return Cauchy(sd or 2.5)
+    return Hierarchical(sd or DEFAULT_SD) if family == "hierarchical" else Gaussian(sd or DEFAULT_SD)
+
+
+def split_files(
+    files: tuple[Path, ...], model: tuple[Path, ...], database: tuple[Path, ...]
+) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """Which files are models and which are databases.
+
+    Raises:
+        MlnError: if there is none of either.
+    """
+    models = tuple(f for f in files if f.suffix == ".mln") + model
+    databases = tuple(f for f in files if f.suffix != ".mln") + database
+    if not models:
+        raise MlnError("no file is a model", "a model ends in .mln; say `-m FILE` for one that does not")
+    if not databases:
+        raise MlnError("there is no database to learn from", "name one after the model; `-d FILE` if it ends in .mln")
+    return models, databases
