@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from mlnlite.model.formulas import All, Any, AtomRef, Const, Equal, Exists, Iff, Not
+from mlnlite.model.formulas import All, Any, AtomRef, Const, Count, Equal, Exists, Iff, Not
 
 
 def atoms(model, evidence, world=0):
@@ -86,6 +86,13 @@ def is_true(formula, expression, binding, world, present):
             return any(inside(f) for f in operands)
         case Iff(left, right):
             return inside(left) == inside(right)
+        case Count(variables, body, low, high):
+            ranges = [present[formula.variables[v].type] for v in variables]
+            n = sum(
+                inside(body, {**binding, **dict(zip(variables, values, strict=True))})
+                for values in itertools.product(*ranges)
+            )
+            return low <= n and (high is None or n <= high)
         case Exists(variables, body):
             ranges = [present[formula.variables[v].type] for v in variables]
             return any(

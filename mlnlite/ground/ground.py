@@ -22,6 +22,7 @@ from mlnlite.ground.tables import completed, tables_of
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import All, Any, AtomRef, Equal, Expression, Iff, Not
 from mlnlite.model.model import Model
+from mlnlite.model.numbers import comparison_truth
 from mlnlite.model.propositional import Cube, cubes, without_quantifiers
 from mlnlite.model.soft import soft_templates
 from mlnlite.model.templates import Template
@@ -131,7 +132,9 @@ def row_tables(model: Model) -> dict[str, tuple[Column, ...]]:
 def source_of(index: int, template: Template, evidence: Evidence, world: str | None = None) -> Source:
     """What plans of an (expanded) template draw on: its formula without quantifiers, and what is known."""
     constants = {name: np.flatnonzero(p.any(axis=0)).tolist() for name, p in evidence.present.items()}
-    formula = without_quantifiers(template.formula, constants)
+    formula = without_quantifiers(
+        template.formula, constants, lambda schema: comparison_truth(schema, evidence.predicates, evidence.types)
+    )
     assert template.rows is not None
     return Source(formula, evidence, template.keys, f"rows:{index}", len(template.rows), world)
 

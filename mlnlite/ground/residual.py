@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import LimitReached
-from mlnlite.model.formulas import All, Any, AtomRef, Equal, Exists, Expression, Iff, Not
+from mlnlite.model.formulas import All, Any, AtomRef, Count, Equal, Exists, Expression, Iff, Not
 from mlnlite.model.propositional import FALSE, TRUE
 
 WIDEST_TABLE = 14
@@ -91,8 +91,8 @@ def atoms_in(expression: Expression) -> set[int]:
             return set().union(*map(atoms_in, operands))
         case Iff(left, right):
             return atoms_in(left) | atoms_in(right)
-        case Exists(_, body):
-            return atoms_in(body)
+        case Exists() | Count():
+            return atoms_in(expression.body)
         case _:
             assert_never(expression)
 
@@ -121,7 +121,7 @@ def _values(expression: Expression, axes: dict[int, NDArray[np.bool_]]) -> NDArr
             return start
         case Iff(left, right):
             return np.asarray(_values(left, axes) == _values(right, axes))
-        case Equal() | Exists():
+        case Equal() | Exists() | Count():
             raise AssertionError("decided before")
         case _:
             assert_never(expression)

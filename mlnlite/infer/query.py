@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
-from mlnlite.model.check import with_terms
 from mlnlite.model.evidence import Evidence
-from mlnlite.model.formulas import All, Any, AtomRef, Const, Equal, Exists, Expression, Formula, Iff, Not, Var
+from mlnlite.model.formulas import All, Any, AtomRef, Const, Count, Equal, Exists, Expression, Formula, Iff, Not, Var
 from mlnlite.model.model import Model
 from mlnlite.model.propositional import FALSE, TRUE, without_quantifiers
 from mlnlite.model.symbols import Predicate
 from mlnlite.model.typing import Constants, FormulaTyper, atoms_of
 from mlnlite.syntax import tree
 from mlnlite.syntax.queries import parse_atom_query, split_queries
+from mlnlite.syntax.walk import map_terms
 from mlnlite.syntax.write import write_formula
 
 Int64 = NDArray[np.int64]
@@ -109,7 +109,13 @@ def _atoms_of_predicate(predicate: Predicate, evidence: Evidence) -> Int64:
 def _typed(formula: tree.Formula, model: Model, evidence: Evidence, mistakes: list[Diagnostic]) -> Formula | None:
     before = len(mistakes)
     constants = Constants({name: dict(t.index) for name, t in evidence.types.items()})
-    typed = FormulaTyper(model.predicates, constants, mistakes).typed(formula)
+    typer = FormulaTyper(model.predicates, constants, mistakes)
+    typed = typer.typed(formula)
+    if typer.comparisons.keys() - model.predicates.keys():
+        hint = "ask for atoms, or put the comparison into a formula of the model"
+        mistakes.append(
+            Diagnostic("E512", "a question cannot compare numbers that no formula compares", formula.span, hint)
+        )
     for atom in atoms_of(formula):
         predicate = model.predicates.get(atom.predicate)
         if predicate is None or predicate.arity != len(atom.arguments):
@@ -168,7 +174,7 @@ def _ground(formula: Formula, expression: Expression, binding: dict[int, int], e
             return Any(tuple(map(inside, operands)))
         case Iff(left_side, right_side):
             return Iff(inside(left_side), inside(right_side))
-        case Exists():
+        case Exists() | Count():
             raise AssertionError("quantifiers are written out before")
         case _:
             assert_never(expression)
@@ -180,7 +186,7 @@ def _text(formula: tree.Formula, binding: dict[str, str], model: Model) -> str:
             return tree.Constant(binding[term.name])
         return term
 
-    return write_formula(with_terms(formula, change) if binding else formula, model.dialect)
+    return write_formula(map_terms(formula, change) if binding else formula, model.dialect)
 
 
 def atom_numbers(expression: Expression) -> Iterable[int]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import assert_never
 
 import numpy as np
 
 from mlnlite.errors import Diagnostic, ModelMistake, did_you_mean, in_order
+from mlnlite.model.cardinality import at_most_as_clauses
 from mlnlite.model.formulas import Formula
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Predicate, Type
@@ -18,6 +18,7 @@ from mlnlite.model.templates import Template
 from mlnlite.model.typing import Constants, FormulaTyper, atoms_of
 from mlnlite.model.weights import checked_weight
 from mlnlite.syntax import tree
+from mlnlite.syntax.walk import map_terms
 from mlnlite.syntax.write import write_formula
 
 
@@ -29,6 +30,8 @@ class _Check:
     predicates: dict[str, Predicate] = field(default_factory=dict)
     constants: Constants = field(default_factory=Constants)
     declared: dict[str, tree.TypeDeclaration] = field(default_factory=dict)
+    comparisons: dict[str, Predicate] = field(default_factory=dict)
+    sized: set[str] = field(default_factory=set)
     templates: list[Template] = field(default_factory=list)
     used: Counter[str] = field(default_factory=Counter)
     mistakes: list[Diagnostic] = field(default_factory=list)
@@ -58,7 +61,11 @@ def check(program: tree.Program) -> Model:
     if state.mistakes:
         raise ModelMistake(in_order(state.mistakes))
     _warn(state)
-    return Model(_types(state), state.predicates, tuple(state.templates), program.dialect, tuple(state.warnings))
+    predicates = state.predicates | state.comparisons
+    templates, warnings = tuple(state.templates), tuple(state.warnings)
+    return Model(
+        _types(state), predicates, templates, program.dialect, warnings, frozenset(state.sized), program.origin
+    )
 
 
 def _nothing_declared(program: tree.Program) -> Diagnostic:
@@ -118,15 +125,18 @@ def _check_predicate(statement: tree.PredicateDeclaration, state: _Check) -> Non
 
 
 def _check_formula(statement: tree.FormulaStatement, state: _Check) -> None:
-    typer = FormulaTyper(state.predicates, state.constants, state.mistakes)
-    formula = typer.typed(statement.formula)
-    weight = np.inf if statement.hard else np.nan
-    if statement.weight is not None:
-        weight = checked_weight(statement.weight, statement.span, state.mistakes)
+    typer = FormulaTyper(state.predicates, state.constants, state.mistakes, comparisons=state.comparisons)
+    formula = typer.typed(at_most_as_clauses(statement.formula) if statement.hard else statement.formula)
+    number = statement.weight if isinstance(statement.weight, tree.NumberOf) else None
+    weight = np.inf if statement.hard else 0.0 if number else np.nan
+    if statement.weight is not None and number is None:
+        weight = checked_weight(_sized(statement.weight, state), statement.span, state.mistakes)
     if formula is None:
         return
     state.used.update(a.predicate for a in atoms_of(statement.formula))
     keys = typer.keys()
+    if number:
+        keys = _with_number(number, formula, keys, state)
     template = Template(
         name=f"formula {len(state.templates) + 1}",
         formula=formula,
@@ -135,10 +145,45 @@ def _check_formula(statement: tree.FormulaStatement, state: _Check) -> None:
         weights=np.array([weight]),
         fixed=statement.fixed,
         unique=_unique(statement, formula, keys, state),
+        number=_place_of(number, formula, keys),
         text=write_formula(statement.formula, state.dialect),
         span=statement.span,
     )
     state.templates.append(template)
+
+
+def _place_of(number: tree.NumberOf | None, formula: Formula, keys: tuple[int, ...]) -> int | None:
+    return next((i for i, k in enumerate(keys) if number and formula.variables[k].name == number.variable), None)
+
+
+def _sized(weight: tree.WeightExpression, state: _Check) -> tree.WeightExpression:
+    """The weight with the sizes of types put in."""
+    match weight:
+        case tree.Size(name):
+            if not state.constants.ids.get(name):
+                message = f"domSize({name}) needs the constants of {name}, and the model does not declare them"
+                state.mistakes.append(Diagnostic("E222", message, weight.span, f"declare them: {name} = {{...}}"))
+                return tree.Number(1.0, weight.span)
+            state.sized.add(name)
+            return tree.Number(float(len(state.constants.ids[name])), weight.span)
+        case tree.Call():
+            return replace(weight, arguments=tuple(_sized(a, state) for a in weight.arguments))
+        case tree.Arithmetic():
+            left = None if weight.left is None else _sized(weight.left, state)
+            return replace(weight, left=left, right=_sized(weight.right, state))
+        case tree.Number() | tree.NumberOf():
+            return weight
+
+
+def _with_number(number: tree.NumberOf, formula: Formula, keys: tuple[int, ...], state: _Check) -> tuple[int, ...]:
+    """The keys with the variable whose number is the weight."""
+    free = {formula.variables[i].name: i for i in formula.free}
+    if number.variable not in free:
+        hint = did_you_mean(number.variable, list(free))
+        message = f"the weight is the number of {number.variable}, which is not a free variable of the formula"
+        state.mistakes.append(Diagnostic("E211", message, number.span, hint))
+        return keys
+    return tuple(sorted({*keys, free[number.variable]}))
 
 
 def _unique(
@@ -161,13 +206,13 @@ def _unique(
 
 
 def _check_table(statement: tree.FormulaTable, state: _Check) -> None:
-    typer = FormulaTyper(state.predicates, state.constants, state.mistakes)
+    typer = FormulaTyper(state.predicates, state.constants, state.mistakes, comparisons=state.comparisons)
     formula = typer.typed(statement.formula)
     cache: dict[tree.WeightExpression, float] = {}
     for row, weight in enumerate(statement.weights):
         if weight not in cache:
             span = statement.spans[row] if statement.spans else statement.span
-            cache[weight] = checked_weight(weight, span, state.mistakes)
+            cache[weight] = checked_weight(_sized(weight, state), span, state.mistakes)
     if formula is None:
         return
     n_rows = len(statement.weights)
@@ -207,35 +252,10 @@ def _named(
         taken.add(name)
         names[hole] = name
         variables[key] = replace(variables[key], name=name)
-    filled = with_terms(
+    filled = map_terms(
         statement.formula, lambda t: tree.Variable(names[t.index], plus=True) if isinstance(t, tree.Hole) else t
     )
     return replace(formula, variables=tuple(variables)), write_formula(filled, dialect)
-
-
-def with_terms(formula: tree.Formula, change: Callable[[tree.Term], tree.Term]) -> tree.Formula:
-    """The formula with each term changed."""
-
-    def inside(f: tree.Formula) -> tree.Formula:
-        return with_terms(f, change)
-
-    match formula:
-        case tree.Atom():
-            return replace(formula, arguments=tuple(map(change, formula.arguments)))
-        case tree.Equality():
-            return replace(formula, left=change(formula.left), right=change(formula.right))
-        case tree.Not(operand):
-            return replace(formula, operand=inside(operand))
-        case tree.And(operands) | tree.Or(operands):
-            return replace(formula, operands=tuple(map(inside, operands)))
-        case tree.Implies(body, head):
-            return replace(formula, body=inside(body), head=inside(head))
-        case tree.Iff(left, right):
-            return replace(formula, left=inside(left), right=inside(right))
-        case tree.Quantified(_, _, body):
-            return replace(formula, body=inside(body))
-        case _:
-            assert_never(formula)
 
 
 # --- warnings

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean, in_order
 from mlnlite.model.coded import Coded, CodedTable
+from mlnlite.model.derived import compared, verify_constants
 from mlnlite.model.evidence import Evidence, Facts, SoftFacts
 from mlnlite.model.model import Model
 from mlnlite.model.soft import SoftColumns, soft_facts
@@ -96,10 +97,12 @@ def check_evidence(
     tabled = any(isinstance(p, TableFacts) for p in programs)
     n_databases = 1 if together else first + tabled
     facts = {name: _sorted(name, reading) for name in model.predicates}
+    result_types = {name: Type(name, tuple(index)) for name, index in reading.types.items()}
+    reading.mistakes += verify_constants(model, result_types)
     if reading.mistakes:
         raise EvidenceMistake(in_order(reading.mistakes))
-    result_types = {name: Type(name, tuple(index)) for name, index in reading.types.items()}
     present = _present(model, result_types, facts, n_databases, reading)
+    facts |= compared(model, result_types, present)
     names = [
         f"{s.name}#{i + 1}"
         for s, p in zip(sources, programs, strict=True)

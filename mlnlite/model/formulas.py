@@ -92,7 +92,17 @@ class Exists:
     body: Expression
 
 
-Expression: TypeAlias = AtomRef | Equal | Not | All | Any | Iff | Exists
+@dataclass(frozen=True, slots=True)
+class Count:
+    """Between `low` and `high` bindings of `variables` make `body` true; `high` None: any number from `low`."""
+
+    variables: tuple[int, ...]
+    body: Expression
+    low: int
+    high: int | None
+
+
+Expression: TypeAlias = AtomRef | Equal | Not | All | Any | Iff | Exists | Count
 
 
 @dataclass(frozen=True, slots=True)

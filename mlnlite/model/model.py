@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from mlnlite.errors import Diagnostic
 from mlnlite.model.symbols import Predicate, Type
 from mlnlite.model.templates import Template
-from mlnlite.syntax.tree import Dialect
+from mlnlite.syntax.tree import Dialect, Origin
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +21,8 @@ class Model:
         templates: the weighted formulas.
         dialect: which dialect it was written in.
         warnings: what the check found strange.
+        sized: types whose number of constants some weight depends on (`domSize`): evidence cannot add to them.
+        origin: the language that it was read from, and why it was taken for it.
     """
 
     types: Mapping[str, Type]
@@ -28,3 +30,5 @@ class Model:
     templates: tuple[Template, ...]
     dialect: Dialect = "standard"
     warnings: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
+    sized: frozenset[str] = frozenset()
+    origin: Origin | None = field(default=None, compare=False, repr=False)

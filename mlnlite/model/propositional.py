@@ -6,17 +6,20 @@ that `cubes` gives are disjoint, so a formula's true (or false) groundings are t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
+from math import comb
 from typing import TypeAlias, assert_never
 
-from mlnlite.errors import LimitReached
+from mlnlite.errors import Diagnostic, LimitReached
 from mlnlite.model.formulas import (
     All,
     Any,
     AtomRef,
     AtomSchema,
     Const,
+    Count,
     Equal,
     Exists,
     Expression,
@@ -48,8 +51,19 @@ class Binding:
         return self.terms.get(term.index, term) if isinstance(term, Var) else term
 
 
-def without_quantifiers(formula: Formula, constants: Mapping[str, Iterable[int]]) -> Formula:
+def _open(schema: AtomSchema) -> bool | None:
+    return None
+
+
+def without_quantifiers(
+    formula: Formula, constants: Mapping[str, Iterable[int]], decide: Callable[[AtomSchema], bool | None] = _open
+) -> Formula:
     """The formula with each `EXIST` written out as a disjunction over the constants of its type.
+
+    Args:
+        formula: the formula.
+        constants: of each type.
+        decide: the truth of an atom, or None if it is to stay an atom.
 
     Raises:
         LimitReached: if that gives more atoms than is sensible.
@@ -57,24 +71,34 @@ def without_quantifiers(formula: Formula, constants: Mapping[str, Iterable[int]]
     if not any(v.bound for v in formula.variables):
         return formula
     atoms: dict[AtomSchema, int] = {}
-    body = _written_out(formula, formula.body, Binding({}), {k: tuple(v) for k, v in constants.items()}, atoms)
+    writing = _Writing(formula, {k: tuple(v) for k, v in constants.items()}, decide, atoms)
+    body = _written_out(writing, formula.body, Binding({}))
     return replace(formula, atoms=tuple(atoms), body=simplified(body, {}))
 
 
-def _written_out(
-    formula: Formula,
-    expression: Expression,
-    binding: Binding,
-    constants: Mapping[str, tuple[int, ...]],
-    atoms: dict[AtomSchema, int],
-) -> Expression:
+@dataclass(frozen=True, slots=True)
+class _Writing:
+    """The formula that is written out, and the atoms so far."""
+
+    formula: Formula
+    constants: Mapping[str, tuple[int, ...]]
+    decide: Callable[[AtomSchema], bool | None]
+    atoms: dict[AtomSchema, int]
+
+
+def _written_out(writing: _Writing, expression: Expression, binding: Binding) -> Expression:
+    formula, constants, atoms = writing.formula, writing.constants, writing.atoms
+
     def inside(e: Expression, b: Binding = binding) -> Expression:
-        return _written_out(formula, e, b, constants, atoms)
+        return _written_out(writing, e, b)
 
     match expression:
         case AtomRef(index):
             schema = formula.atoms[index]
             bound = AtomSchema(schema.predicate, tuple(map(binding.term, schema.arguments)))
+            truth = writing.decide(bound)
+            if truth is not None:
+                return _constant(truth)
             if len(atoms) > MOST_WRITTEN_OUT:
                 raise LimitReached(f"a quantifier ranges over more than {MOST_WRITTEN_OUT:,} atoms in one formula")
             return AtomRef(atoms.setdefault(bound, len(atoms)))
@@ -88,14 +112,63 @@ def _written_out(
             return Any(tuple(map(inside, operands)))
         case Iff(left_side, right_side):
             return Iff(inside(left_side), inside(right_side))
-        case Exists((), body):
-            return inside(body)
-        case Exists((first, *rest), body):
-            values = constants[formula.variables[first].type]
-            rest_of_it = Exists(tuple(rest), body)
-            return Any(tuple(inside(rest_of_it, Binding({**binding.terms, first: Const(c)})) for c in values))
+        case Exists(variables, body):
+            bindings = _bindings(formula, variables, constants)
+            return Any(tuple(inside(body, Binding({**binding.terms, **more})) for more in bindings))
+        case Count(variables, body, low, high):
+            bindings = _bindings(formula, variables, constants)
+            cases = [simplified(inside(body, Binding({**binding.terms, **more})), {}) for more in bindings]
+            return between(cases, low, len(cases) if high is None else high)
         case _:
             raise AssertionError(expression)
+
+
+def _bindings(
+    formula: Formula, variables: tuple[int, ...], constants: Mapping[str, tuple[int, ...]]
+) -> Iterator[dict[int, Term]]:
+    """All constants for some variables, the last one fastest."""
+    for values in product(*(constants[formula.variables[v].type] for v in variables)):
+        yield dict(zip(variables, map(Const, values), strict=True))
+
+
+def between(cases: Sequence[Expression], low: int, high: int) -> Expression:
+    """Whether between `low` and `high` of some expressions are true.
+
+    Raises:
+        LimitReached: it takes too large a formula to say so.
+
+    >>> a, b = AtomRef(0), AtomRef(1)
+    >>> between([a, b], 1, 2) == Any((a, b)), between([a, b, TRUE], 3, 3) == All((a, b))
+    (True, True)
+    """
+    certain = sum(case == TRUE for case in cases)
+    left = [case for case in cases if case not in (TRUE, FALSE)]
+    low, high = max(0, low - certain), high - certain
+    if high < 0 or low > len(left):
+        return FALSE
+    if low == len(left):
+        return All(tuple(left))
+    if high == 0:
+        return Not(Any(tuple(left)))
+    if high >= len(left) and low <= 1:
+        return Any(tuple(left)) if low else TRUE
+    ways = min(comb(len(left), min(high + 1, len(left) // 2)), comb(len(left), min(max(low, 1), len(left) // 2)))
+    if len(left) * ways > MOST_WRITTEN_OUT * 8:
+        message = f"`count` with bounds {low} and {high} over {len(left)} atoms has too many cases"
+        hint = "count over fewer constants, or bound the number by 0, 1 or 2"
+        raise LimitReached([Diagnostic("E411", message, hint=hint)])
+    return _decision(left, low, high)
+
+
+def _decision(cases: Sequence[Expression], low: int, high: int) -> Expression:
+    """The first case decides what is left to be counted."""
+    if low <= 0 and high >= len(cases):
+        return TRUE
+    if high < 0 or low > len(cases):
+        return FALSE
+    first, rest = cases[0], cases[1:]
+    yes, no = _decision(rest, low - 1, high - 1), _decision(rest, low, high)
+    return simplified(Any((All((first, yes)), All((Not(first), no)))), {})
 
 
 def _equal(left: Term, right: Term) -> Expression:
@@ -129,7 +202,7 @@ def simplified(expression: Expression, known: Cube) -> Expression:
                 if a == FALSE:
                     return _negated(b)
             return TRUE if left_simple == right_simple else Iff(left_simple, right_simple)
-        case Exists():
+        case Exists() | Count():
             raise AssertionError("quantifiers are written out before")
         case _:
             assert_never(expression)
@@ -170,7 +243,7 @@ def first_proposition(expression: Expression) -> Proposition:
             return first_proposition(operands[0])
         case Iff(left, _):
             return first_proposition(left)
-        case Exists():
+        case Exists() | Count():
             raise AssertionError("quantifiers are written out before")
         case _:
             assert_never(expression)

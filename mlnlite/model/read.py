@@ -21,17 +21,17 @@ from mlnlite.source import Source
 from mlnlite.syntax.evidence import parse_evidence
 from mlnlite.syntax.files import read_source
 from mlnlite.syntax.parse import parse_model
-from mlnlite.syntax.tree import Dialect, EvidenceProgram
+from mlnlite.syntax.tree import AnyDialect, EvidenceProgram
 
 Path: TypeAlias = str | PathLike[str]
 
 
-def read_model(*paths: Path, dialect: Dialect | None = None) -> Model:
+def read_model(*paths: Path, dialect: AnyDialect | None = None) -> Model:
     """Reads a model from a file, or from several that continue each other.
 
     Args:
         paths: `.mln` files.
-        dialect: `standard` (variables are lower case) or `prac` (variables are `?x`); by default found out.
+        dialect: `standard`, `prac`, `alchemy`, `tuffy`, `rockit` or `lomrf`; by default found out.
 
     Raises:
         SyntaxMistake: if the text is not in the language; with every mistake.
@@ -40,7 +40,7 @@ def read_model(*paths: Path, dialect: Dialect | None = None) -> Model:
     return check(parse_model([read_source(path) for path in paths], dialect))
 
 
-def model_from_text(text: str, *, dialect: Dialect | None = None) -> Model:
+def model_from_text(text: str, *, dialect: AnyDialect | None = None) -> Model:
     """The model that a text means. Raises as `read_model`."""
     return check(parse_model([Source("<text>", text)], dialect))
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Literal
 
 from mlnlite.source import Span
+from mlnlite.syntax.tree import Comparison
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,8 @@ class Predicate:
         marker: `!` exactly one value, `?` at most one, empty if `value` is None.
         closed: what is not a fact is false.
         span: where it was declared.
-        comparison: of the predicates that stand for comparisons of numbers (`x < y`), how it is written, with `{0}`,
-            `{1}`, ... in place of the arguments. Their facts follow from the constants.
+        comparison: of the predicates that stand for comparisons of numbers, the comparison, with variables `x0`, `x1`,
+            ... for the arguments. Their facts follow from the constants.
     """
 
     name: str
@@ -48,7 +49,7 @@ class Predicate:
     marker: Literal["", "!", "?"] = ""
     closed: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
-    comparison: str = ""
+    comparison: Comparison | None = None
 
     @property
     def arity(self) -> int:
@@ -66,6 +67,8 @@ class Predicate:
         >>> str(Predicate("age", ("person", "years"), value=1, marker="!"))
         'age(person, years!)'
         """
+        if self.comparison:
+            return self.name
         marks = [t + (self.marker if i == self.value else "") for i, t in enumerate(self.types)]
         inside = f"({', '.join(marks)})" if marks else ""
         return f"{'*' if self.closed else ''}{self.name}{inside}"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.model.formulas import Formula
+from mlnlite.model.numbers import numbers_of
 from mlnlite.model.symbols import Type
 from mlnlite.source import Span
 
@@ -32,6 +33,7 @@ class Template:
         fixed: not to be learnt.
         unique: groups of keys (indices into `keys`) whose order does not matter: of the rows that differ only in the
             order of such a group there is one, that with rising ids; equal ones are kept.
+        number: which of the keys names the weight of a row: the number that its constant is. Such a template is fixed.
         text: the formula as its user wrote it, keys included.
         span: where (its first row).
         row_spans: where each row stands, if it came from a file row by row.
@@ -44,6 +46,7 @@ class Template:
     weights: NDArray[np.float64]
     fixed: bool = False
     unique: tuple[tuple[int, ...], ...] = ()
+    number: int | None = None
     text: str = ""
     span: Span | None = field(default=None, compare=False, repr=False)
     row_spans: tuple[Span, ...] = field(default=(), compare=False, repr=False)
@@ -64,4 +67,7 @@ class Template:
             for i, j in pairwise(group):
                 keep &= rows[:, i] <= rows[:, j]
         rows = np.ascontiguousarray(rows[keep])
+        if self.number is not None:
+            numbers = numbers_of(types[self.formula.variables[self.keys[self.number]].type])
+            return replace(self, rows=rows, weights=numbers[rows[:, self.number]], number=None)
         return replace(self, rows=rows, weights=np.broadcast_to(self.weights, len(rows)).copy())

@@ -9,9 +9,11 @@ from typing import TypeAlias, assert_never
 from mlnlite.errors import Diagnostic, did_you_mean
 from mlnlite.model import formulas as typed
 from mlnlite.model.formulas import Argument
+from mlnlite.model.numbers import comparison_constants, comparison_predicate, holds, number_of
 from mlnlite.model.symbols import Predicate
 from mlnlite.source import Span
 from mlnlite.syntax import tree
+from mlnlite.syntax.walk import comparison_variables
 
 _Build: TypeAlias = Callable[[], typed.Expression]
 
@@ -41,13 +43,15 @@ class _Variable:
 class FormulaTyper:
     """Types one formula. `mistakes` collects what is wrong; the result is only good if nothing was added to it.
 
-    Free variables come in order of appearance; a hole is a free variable, its number in `holes`.
+    Free variables come in order of appearance; a hole is a free variable, its number in `holes`. A comparison of numbers
+    becomes an atom of a predicate of its own, which is added to `comparisons`.
     """
 
     predicates: Mapping[str, Predicate]
     constants: Constants
     mistakes: list[Diagnostic]
     variables: list[_Variable] = field(default_factory=list)
+    comparisons: dict[str, Predicate] = field(default_factory=dict)
     holes: dict[int, int] = field(default_factory=dict)
     atoms: dict[typed.AtomSchema, int] = field(default_factory=dict)
     _scopes: list[dict[str, int]] = field(default_factory=lambda: [{}])
@@ -96,8 +100,43 @@ class FormulaTyper:
                 return lambda: typed.Iff(left(), right())
             case tree.Quantified():
                 return self._quantifier(formula)
+            case tree.Comparison():
+                return self._comparison(formula)
+            case tree.Count():
+                return self._count(formula)
             case _:
                 assert_never(formula)
+
+    def _comparison(self, formula: tree.Comparison) -> _Build:
+        for constant in comparison_constants(formula):
+            if number_of(constant.name) is None:
+                hint = "constants are compared as numbers; `=` compares any"
+                self._mistake("E210", f"{constant.name} is no number", constant.span or formula.span, hint)
+        indices = tuple(dict.fromkeys(self._variable(v) for v in comparison_variables(formula)))
+        if not indices:
+            return lambda: typed.All(()) if bool(holds(formula, ())) else typed.Any(())
+
+        def build() -> typed.Expression:
+            place = {self.variables[i].name: n for n, i in enumerate(indices)}
+            types = tuple(self.variables[i].type or "" for i in indices)
+            predicate = comparison_predicate(formula, place, types)
+            self.comparisons.setdefault(predicate.name, predicate)
+            schema = typed.AtomSchema(predicate.name, tuple(map(typed.Var, indices)))
+            return typed.AtomRef(self.atoms.setdefault(schema, len(self.atoms)))
+
+        return build
+
+    def _count(self, formula: tree.Count) -> _Build:
+        own = {name: self._new(_Variable(name, bound=True, span=formula.span)) for name in formula.variables}
+        self._scopes.append(own)
+        inside = self._formula(formula.body)
+        self._scopes.pop()
+        indices, number = tuple(own.values()), formula.number
+        bounds = {"<=": (0, number), "<": (0, number - 1), ">=": (number, None), ">": (number + 1, None)}
+        low, high = bounds.get(formula.operator, (number, number))
+        if formula.operator == "!=":
+            return lambda: typed.Not(typed.Count(indices, inside(), low, high))
+        return lambda: typed.Count(indices, inside(), low, high)
 
     def _quantifier(self, formula: tree.Quantified) -> _Build:
         own = {name: self._new(_Variable(name, bound=True, span=formula.span)) for name in formula.variables}
@@ -223,7 +262,7 @@ def atoms_of(formula: tree.Formula) -> Iterator[tree.Atom]:
     match formula:
         case tree.Atom():
             yield formula
-        case tree.Equality():
+        case tree.Equality() | tree.Comparison():
             return
         case tree.Not(operand):
             yield from atoms_of(operand)
@@ -233,7 +272,7 @@ def atoms_of(formula: tree.Formula) -> Iterator[tree.Atom]:
         case tree.Implies(left, right) | tree.Iff(left, right):
             yield from atoms_of(left)
             yield from atoms_of(right)
-        case tree.Quantified(_, _, body):
-            yield from atoms_of(body)
+        case tree.Quantified() | tree.Count():
+            yield from atoms_of(formula.body)
         case _:
             assert_never(formula)

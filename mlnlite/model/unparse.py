@@ -8,10 +8,10 @@ from typing import assert_never
 import numpy as np
 
 from mlnlite.model import formulas as typed
-from mlnlite.model.check import with_terms
 from mlnlite.model.model import Model
 from mlnlite.model.templates import Template
 from mlnlite.syntax import tree
+from mlnlite.syntax.walk import map_comparison, map_terms
 from mlnlite.syntax.write import write_formula, write_model
 
 
@@ -27,6 +27,8 @@ def program_of(model: Model) -> tree.Program:
         if t.constants:
             statements.append(tree.TypeDeclaration(t.name, tuple(map(tree.Constant, t.constants))))
     for p in model.predicates.values():
+        if p.comparison:
+            continue
         arguments = (tree.Argument(name, p.marker if i == p.value else "") for i, name in enumerate(p.types))
         statements.append(tree.PredicateDeclaration(p.name, tuple(arguments), p.closed))
     for template in model.templates:
@@ -65,6 +67,9 @@ def _statement(template: Template, model: Model) -> tree.FormulaStatement:
     names = [template.formula.variables[k].name for k in template.keys]
     unique = tuple(tuple(names[i] for i in group) for group in template.unique)
     formula = _Untyper(template, model, None).formula()
+    if template.number is not None:
+        weight = tree.NumberOf(names[template.number])
+        return tree.FormulaStatement(formula, weight, fixed=True)
     return _weighted(template, formula, float(template.weights[0]), unique)
 
 
@@ -84,7 +89,7 @@ def _row_by_row(
 
 
 def _filled(formula: tree.Formula, constants: Sequence[tree.Constant]) -> tree.Formula:
-    return with_terms(formula, lambda t: constants[t.index] if isinstance(t, tree.Hole) else t)
+    return map_terms(formula, lambda t: constants[t.index] if isinstance(t, tree.Hole) else t)
 
 
 class _Untyper:
@@ -102,6 +107,9 @@ class _Untyper:
         match expression:
             case typed.AtomRef(index):
                 schema = self.template.formula.atoms[index]
+                comparison = self.model.predicates[schema.predicate].comparison
+                if comparison:
+                    return self._comparison(comparison, schema)
                 types = self.model.predicates[schema.predicate].types
                 terms = tuple(self._term(a, t) for a, t in zip(schema.arguments, types, strict=True))
                 return tree.Atom(schema.predicate, terms)
@@ -124,8 +132,27 @@ class _Untyper:
                 return tree.Iff(self._expression(left_side), self._expression(right_side))
             case typed.Exists(variables, body):
                 return self._quantified("exist", variables, body)
+            case typed.Count(variables, body, low, high):
+                return self._count(variables, body, low, high)
             case _:
                 assert_never(expression)
+
+    def _comparison(self, comparison: tree.Comparison, schema: typed.AtomSchema) -> tree.Formula:
+        names = [self.template.formula.variables[a.index] for a in schema.arguments if isinstance(a, typed.Var)]
+        indices = [a.index for a in schema.arguments if isinstance(a, typed.Var)]
+        plus = [self.holes is None and i in self.template.keys and i != self._number() for i in indices]
+        return map_comparison(comparison, lambda v: tree.Variable(names[int(v.name[1:])].name, plus[int(v.name[1:])]))
+
+    def _number(self) -> int | None:
+        """The variable whose number is the weight."""
+        return None if self.template.number is None else self.template.keys[self.template.number]
+
+    def _count(self, variables: tuple[int, ...], body: typed.Expression, low: int, high: int | None) -> tree.Formula:
+        names = tuple(self.template.formula.variables[v].name for v in variables)
+        inside = self._expression(body)
+        if high is None or low == high:
+            return tree.Count(names, inside, ">=" if high is None else "=", low)
+        return tree.Count(names, inside, "<=", high)
 
     def _quantified(self, quantifier: str, variables: tuple[int, ...], body: typed.Expression) -> tree.Formula:
         names = tuple(self.template.formula.variables[v].name for v in variables)
@@ -138,6 +165,6 @@ class _Untyper:
         if term.index not in self.template.keys:
             return tree.Variable(variable.name)
         if self.holes is None:
-            return tree.Variable(variable.name, plus=True)
+            return tree.Variable(variable.name, plus=term.index != self._number())
         self.holes.append(self.template.keys.index(term.index))
         return tree.Hole(len(self.holes) - 1)

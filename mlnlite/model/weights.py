@@ -8,7 +8,7 @@ from typing import assert_never
 
 from mlnlite.errors import Diagnostic
 from mlnlite.source import Span
-from mlnlite.syntax.tree import Arithmetic, Call, Number, WeightExpression
+from mlnlite.syntax.tree import Arithmetic, Call, Number, NumberOf, Size, WeightExpression
 
 LOG_OF_ZERO = -100.0
 """What `logx(0)` is: probability e^-100. (pracmln's value, kept so that its files mean the same.)"""
@@ -88,6 +88,8 @@ def evaluate(weight: WeightExpression) -> float:
             if len(arguments) != 1:
                 raise ValueError(f"{function} takes one number, found {len(arguments)}")
             return FUNCTIONS[function](evaluate(arguments[0]))
+        case Size() | NumberOf():
+            raise AssertionError("replaced before")
         case _:
             assert_never(weight)
 

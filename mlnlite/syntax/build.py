@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 from mlnlite.errors import SyntaxMistake
 from mlnlite.source import Span
-from mlnlite.syntax import tree
+from mlnlite.syntax import raw, tree
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.nesting import refuse_long_expression
 from mlnlite.syntax.place import Place
@@ -101,9 +101,37 @@ def _atom(place: Place, span: Span, children: Children) -> tree.Atom:
 
 
 def _equality(place: Place, span: Span, children: Children) -> tree.Formula:
+    """Terms that are the same constant; or numbers that compare, if there is arithmetic or an order."""
     left, right = _nodes(children)
-    equality = tree.Equality(left, right, span)
-    return tree.Not(equality, span) if any(str(c) in ("!=", "=/=") for c in children) else equality
+    sign = next(str(c) for c in children if isinstance(c, str) and c not in ("(", ")", "+"))
+    sign = "!=" if sign in ("=/=", "<>") else sign
+    if sign in ("=", "!=") and not any(isinstance(side, tree.Operation) for side in (left, right)):
+        equality = tree.Equality(left, right, span)
+        return tree.Not(equality, span) if sign == "!=" else equality
+    return tree.Comparison(sign, left, right, span)
+
+
+def _operation(place: Place, span: Span, children: Children) -> tree.Operation:
+    left, operator, right = children
+    return tree.Operation(str(operator), left, right, span)
+
+
+def _both(place: Place, span: Span, children: Children) -> raw.Both:
+    return raw.Both(tree.Atom(str(children[1]), tuple(_nodes(children)), span), span)
+
+
+def _group(place: Place, span: Span, children: Children) -> raw.Group:
+    names = tuple(str(c) for c in children if getattr(c, "type", "") == "NAME")
+    return raw.Group(names, tuple(_nodes(children)), span)
+
+
+def _count(place: Place, span: Span, children: Children) -> tree.Count:
+    body, variables = _nodes(children)
+    sign, number = str(children[-2]), children[-1]
+    if not number.isdigit():
+        hint = "write how many, like `count(P(x) | x) <= 2`"
+        raise SyntaxMistake([mistake("E101", place.token(number), hint, found=f"`{number}`", expected="a number")])
+    return tree.Count(variables, body, "!=" if sign == "=/=" else sign, int(number), span)
 
 
 def _negation(place: Place, span: Span, children: Children) -> tree.Not:
@@ -175,6 +203,31 @@ def _call(place: Place, span: Span, children: Children) -> tree.Call:
     return tree.Call(str(children[0]), tuple(_nodes(children)), span)
 
 
+def _size(place: Place, span: Span, children: Children) -> tree.Size:
+    return tree.Size(str(children[2]), span)
+
+
+def _macro(place: Place, span: Span, children: Children) -> raw.Macro:
+    return raw.Macro(str(children[0]), span)
+
+
+def _macro_definition(place: Place, span: Span, children: Children) -> raw.Definition:
+    return raw.Definition(str(children[0]), children[-1], span)
+
+
+def _probability(place: Place, span: Span, children: Children) -> Weight:
+    """The log-odds: with this weight alone, the formula has this probability whenever its body holds."""
+    value = float(children[1])
+    if not 0 < value < 1:
+        hint = "a probability lies between 0 and 1; write a final dot for what is certain"
+        raise SyntaxMistake([mistake("E129", span, hint, found=str(children[1]))])
+    return Weight(tree.Call("logit", (tree.Number(value, span),), span), False, span)
+
+
+def _number_of(place: Place, span: Span, children: Children) -> Weight:
+    return Weight(tree.NumberOf(str(children[0]).removeprefix("?"), span), True, span)
+
+
 def _weight(place: Place, span: Span, children: Children) -> Weight:
     refuse_long_expression(children[-1])
     return Weight(children[-1], len(children) > 1, span)
@@ -183,14 +236,15 @@ def _weight(place: Place, span: Span, children: Children) -> Weight:
 # --- statements
 
 
-def _statement(place: Place, span: Span, children: Children) -> tree.FormulaStatement:
+def statement(place: Place, span: Span, children: Children) -> tree.FormulaStatement:
+    """A formula with its weight; the formula may still have raw nodes."""
     hard = isinstance(children[-1], str)
     weight = children[0] if isinstance(children[0], Weight) else None
     formula = next(c for c in children if not isinstance(c, Weight | str))
     if weight and hard:
         hint = "drop the weight, or drop the final dot"
         raise SyntaxMistake([mistake("E107", weight.span, hint)])
-    if weight and not place.source.text[weight.span.end].isspace():
+    if weight and weight.span.text[-1] != ":" and not place.source.text[weight.span.end].isspace():
         hint = f"put a space after it: `{weight.span.text} {_begin(place.source.text[weight.span.end : span.end])}`"
         raise SyntaxMistake([mistake("E108", weight.span, hint, number=weight.span.text)])
     if weight is None:
@@ -204,7 +258,7 @@ def _begin(text: str) -> str:
 
 def _declaration(place: Place, span: Span, children: Children) -> tree.PredicateDeclaration:
     closed = children[0] == "*"
-    name = children[closed]
+    name = next(c for c in children if c != "*")
     if name.lower() in ("exist", "exists", "forall"):
         hint = f"write `{name.upper()} x (...)`; a predicate cannot have this name"
         raise SyntaxMistake([mistake("E127", place.token(name), hint, quantifier=name)])
@@ -212,12 +266,33 @@ def _declaration(place: Place, span: Span, children: Children) -> tree.Predicate
 
 
 def _argument(place: Place, span: Span, children: Children) -> tree.Argument:
-    marker: Any = str(children[1]) if len(children) > 1 else ""
+    marker: Any = str(children[-1]) if children[-1] in ("!", "?") else ""
     return tree.Argument(str(children[0]), marker, span)
 
 
 def _type_declaration(place: Place, span: Span, children: Children) -> tree.TypeDeclaration:
-    return tree.TypeDeclaration(str(children[0]), tuple(_nodes(children)), span)
+    return tree.TypeDeclaration(str(children[0]), tuple(_ranges(place, children)), span)
+
+
+MOST_IN_RANGE = 1_000_000
+
+
+def _ranges(place: Place, children: Children) -> Iterator[tree.Constant]:
+    """The constants, those of ranges `1, ..., 5` written out."""
+    elements = [c for c in children if isinstance(c, tree.Constant) or getattr(c, "type", "") == "ELLIPSIS"]
+    for i, element in enumerate(elements):
+        if isinstance(element, tree.Constant):
+            yield element
+            continue
+        ends = [
+            c.name for c in (*elements[max(0, i - 1) : i], *elements[i + 1 : i + 2]) if isinstance(c, tree.Constant)
+        ]
+        numbers = [int(e) for e in ends if re.fullmatch(r"-?\d{1,9}", e)]
+        if len(numbers) < 2 or not 0 < numbers[1] - numbers[0] <= MOST_IN_RANGE:
+            hint = "write `1, ..., 10`: whole numbers, the first one smaller"
+            raise SyntaxMistake([mistake("E151", place.token(element), hint, limit=MOST_IN_RANGE)])
+        span = place.token(element)
+        yield from (tree.Constant(str(n), span) for n in range(numbers[0] + 1, numbers[1]))
 
 
 def _start(token: Any) -> int:  # noqa: ANN401
@@ -260,8 +335,17 @@ BUILDERS: dict[str, Callable[[Place, Span, Children], Any]] = {
     "positive": _positive,
     "call": _call,
     "weight": _weight,
-    "standard_statement": _statement,
-    "prac_statement": _statement,
+    "standard_statement": statement,
+    "prac_statement": statement,
+    "operation": _operation,
+    "both": _both,
+    "group": _group,
+    "count": _count,
+    "size": _size,
+    "macro": _macro,
+    "macro_definition": _macro_definition,
+    "probability": _probability,
+    "number_of": _number_of,
     "declaration": _declaration,
     "argument": _argument,
     "type_declaration": _type_declaration,

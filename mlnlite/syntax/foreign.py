@@ -50,8 +50,16 @@ CONSTRUCTS: tuple[tuple[re.Pattern[str], str, str], ...] = tuple(
         (r"\*\s*[^\W\d]\w*\s*\(", "`*P(...)` inside a formula", "write one formula with `P(...)`, one with `!P(...)`"),
         (r":-", "a rule (`head :- body`)", "write `body => head`"),
         (r"\.\.\.", "a range of constants (`...`)", "list every constant"),
-        (r"<=(?!>)|<(?![=>-])|(?<![=<-])>=?", "comparing terms by size", "list the order as facts of a predicate"),
-        (r"[\w'?]+\s*[-+*/%]\s*[\w'?]+(?=\s*[,)=])", "arithmetic on terms", "list the results as facts of a predicate"),
+        (
+            r"<=(?!>)|<(?![=>-])|(?<![=<-])>=?",
+            "a comparison by size here",
+            "compare variables and numbers: `x + 1 < y`",
+        ),
+        (
+            r"[\w'?]+\s*[-+*/%]\s*[\w'?]+(?=\s*[,)=])",
+            "arithmetic here",
+            "put blanks around the sign, and a variable first: `x + 1 = y`",
+        ),
         (r"(?<=[(,])\s*[^\W\d][\w']*\(", "a function inside an argument", "use a predicate with one more argument"),
         (r"[\[{]", "this kind of bracket in a formula", "use ( and )"),
     )

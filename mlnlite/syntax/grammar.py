@@ -6,11 +6,13 @@ as all else that a short command does.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from mlnlite.errors import SyntaxMistake
 from mlnlite.syntax.build import BUILDERS
+from mlnlite.syntax.build_foreign import FOREIGN_BUILDERS
 from mlnlite.syntax.explain import Failure, explain
 from mlnlite.syntax.nesting import refuse_deep_nesting
 from mlnlite.syntax.place import Language, Place
@@ -19,11 +21,20 @@ if TYPE_CHECKING:
     from lark import Lark, Token, Tree
     from lark.exceptions import UnexpectedInput
 
+_OURS = ("declaration", "type_declaration", "weight", "macro_definition")
+_FOREIGN = ("statement", "formula", "declaration", "type_declaration", "function")
 _STARTS: dict[Language, tuple[str, ...]] = {
-    "standard": ("standard_statement", "standard_formula", "declaration", "type_declaration", "weight"),
-    "prac": ("prac_statement", "prac_formula", "declaration", "type_declaration", "weight"),
+    "standard": ("standard_statement", "standard_formula", *_OURS),
+    "prac": ("prac_statement", "prac_formula", *_OURS),
+    "alchemy": _FOREIGN,
+    "tuffy": _FOREIGN,
+    "rockit": _FOREIGN,
+    "lomrf": _FOREIGN,
     "evidence": ("fact", "value", "type_declaration"),
 }
+
+
+_FILES = {"standard": "mln.lark", "prac": "mln.lark", "evidence": "evidence.lark"}
 
 
 @cache
@@ -32,7 +43,7 @@ def _parser(language: Language) -> Lark:
 
     return Lark.open_from_package(
         "mlnlite.grammars",
-        "evidence.lark" if language == "evidence" else "mln.lark",
+        _FILES.get(language, "foreign.lark"),
         start=list(_STARTS[language]),
         parser="lalr",
         propagate_positions=True,
@@ -57,7 +68,7 @@ def parse_node(rule: str, text: str, place: Place, language: Language) -> Any:  
     except UnexpectedInput as error:
         at, expected = _where(error, len(text))
         raise SyntaxMistake([explain(Failure(place, text, at, frozenset(expected), language, rule))]) from None
-    return _build(tree, place)
+    return _build(tree, replace(place, language=language))
 
 
 def _where(error: UnexpectedInput, end: int) -> tuple[int, set[str]]:
@@ -75,9 +86,10 @@ def _build(tree: Tree[Token], place: Place) -> Any:  # noqa: ANN401
     """Bottom up and without recursion, so that depth costs no stack."""
     from lark import Tree
 
+    builders = BUILDERS if place.language in _FILES else BUILDERS | FOREIGN_BUILDERS
     built: dict[int, Any] = {}
     for node in tree.iter_subtrees():
         children = [built[id(child)] if isinstance(child, Tree) else child for child in node.children]
         span = place.span(node.meta.start_pos, node.meta.end_pos)
-        built[id(node)] = BUILDERS[node.data](place, span, children)
+        built[id(node)] = builders[node.data](place, span, children)
     return built[id(tree)]

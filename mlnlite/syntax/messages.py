@@ -35,6 +35,7 @@ MESSAGES: dict[str, str] = {
     "E126": "`{name}()` has empty parentheses",
     "E127": "`{quantifier}` does not say which variables it binds",
     "E128": "{found} is not a quote here",
+    "E129": "the probability {found} does not lie between 0 and 1",
     # files
     "E130": "there is no file `{path}`",
     "E131": "`{path}` is a folder, not a file",
@@ -56,6 +57,11 @@ MESSAGES: dict[str, str] = {
     "E148": "{found} is not a truth value",
     # queries
     "E150": "an item of the query is empty",
+    # expansions
+    "E151": "`...` stands between two whole numbers, rising, at most {limit:,} apart",
+    "E152": "the formula stands for more than {limit} formulas",
+    "E153": "the macro `{found}` is not defined above",
+    "E154": "{problem}",
     "E199": "more than {limit} mistakes; the rest of the file was not read",
 }
 

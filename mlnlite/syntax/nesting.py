@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from mlnlite.errors import SyntaxMistake
-from mlnlite.syntax import tree
+from mlnlite.syntax import raw, tree
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
 
@@ -62,9 +62,11 @@ def refuse_long_expression(weight: tree.WeightExpression) -> None:
     raise SyntaxMistake([mistake("E116", weight.span, "compute the weight beforehand", limit=MAX_DEPTH)])
 
 
-def _parts(node: tree.WeightExpression) -> tuple[tree.WeightExpression, ...]:
+def _parts(node: tree.WeightExpression | raw.Macro) -> tuple[tree.WeightExpression, ...]:
     match node:
-        case tree.Number():
+        case raw.Macro():
+            return ()
+        case tree.Number() | tree.Size() | tree.NumberOf():
             return ()
         case tree.Call():
             return node.arguments

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from mlnlite.errors import Diagnostic, SyntaxMistake
 from mlnlite.source import Source, Span
 from mlnlite.syntax import tree
+from mlnlite.syntax.detect import NOTES, detected
 from mlnlite.syntax.dialects import (
     PracCheck,
     constants_as_variables,
@@ -22,10 +23,11 @@ from mlnlite.syntax.includes import File, load
 from mlnlite.syntax.lines import split_statements
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
+from mlnlite.syntax.programs import Vocabulary, completion, finished, read_test
 from mlnlite.syntax.queries import parse_atom_query, split_queries
-from mlnlite.syntax.statements import read_statement
+from mlnlite.syntax.statements import read_foreign, read_statement
 from mlnlite.syntax.tables import Gathering, add, can_gather, finish, read_row
-from mlnlite.syntax.tree import Dialect, Program
+from mlnlite.syntax.tree import AnyDialect, Dialect, Origin, Program
 
 __all__ = ["parse_atom_query", "parse_model", "read_source", "split_queries"]
 
@@ -39,17 +41,17 @@ class _Reading:
     Attributes:
         dialect: of the model.
         check: what tells the dialects apart.
-        declared: the first declaration of each predicate so far.
+        vocabulary: what statements have defined so far.
         mistakes: what was wrong so far.
     """
 
-    dialect: Dialect
+    dialect: AnyDialect
     check: PracCheck
-    declared: dict[str, tree.PredicateDeclaration] = field(default_factory=dict)
+    vocabulary: Vocabulary = field(default_factory=Vocabulary)
     mistakes: list[Diagnostic] = field(default_factory=list)
 
 
-def parse_model(sources: Sequence[Source], dialect: Dialect | None = None) -> Program:
+def parse_model(sources: Sequence[Source], dialect: AnyDialect | None = None) -> Program:
     """The program of a model.
 
     Args:
@@ -58,14 +60,17 @@ def parse_model(sources: Sequence[Source], dialect: Dialect | None = None) -> Pr
 
     Returns:
         The program: statements in the order of the files, formulas that differ only in constants and weights as tables.
+        The languages of other systems (alchemy, tuffy, rockit, lomrf) give a program of the standard dialect.
 
     Raises:
         SyntaxMistake: with every mistake in every file.
     """
     files = [load(source) for source in sources]
-    marked = first_marked(code for file in files for code in file.codes())
+    codes = [code for file in files for code in file.codes()]
+    marked = first_marked(codes)
     check = PracCheck(marked, doubt=dialect is None or marked is None)
-    reading = _Reading(dialect or ("prac" if marked else "standard"), check)
+    found, reasons = (dialect, ()) if dialect else detected(codes) if marked is None else ("prac", (_why(marked),))
+    reading = _Reading(found, check)
     reading.mistakes += [diagnostic for file in files for diagnostic in file.mistakes]
     if dialect == "standard" and marked:
         raise SyntaxMistake([*reading.mistakes, wrong_dialect(marked)])
@@ -75,7 +80,16 @@ def parse_model(sources: Sequence[Source], dialect: Dialect | None = None) -> Pr
     if reading.mistakes:
         raise SyntaxMistake(_in_order(reading.mistakes))
     span = Span(sources[0], 0, len(sources[0].text)) if sources else None
-    return Program(statements, reading.dialect, span)
+    return Program(statements, _written(found), span, Origin(found, reasons, NOTES[found]))
+
+
+def _why(marked: Span) -> str:
+    return f"a variable with a question mark at {marked.place}"
+
+
+def _written(dialect: AnyDialect) -> Dialect:
+    """The dialect of the tree of a language."""
+    return "prac" if dialect == "prac" else "standard"
 
 
 def _in_order(mistakes: list[Diagnostic]) -> list[Diagnostic]:
@@ -87,9 +101,14 @@ def _in_order(mistakes: list[Diagnostic]) -> list[Diagnostic]:
 
 
 def _read_files(files: Sequence[File], reading: _Reading) -> tuple[tree.Statement, ...]:
-    gathering = Gathering(reading.dialect)
+    gathering = Gathering(_written(reading.dialect))
     for file in files:
         _read_file(file, reading, gathering)
+    try:
+        rules, reading.vocabulary.rules = list(completion(reading.vocabulary)), {}
+        gathering.items += rules
+    except SyntaxMistake as error:
+        reading.mistakes += error.diagnostics
     if reading.dialect == "prac":
         for group in gathering.groups.values():
             reading.mistakes += group_mistakes(group, reading.check)
@@ -104,30 +123,42 @@ def _read_file(file: File, reading: _Reading, gathering: Gathering) -> None:
             reading.mistakes.append(mistake("E199", place.span(0, len(text)), limit=MAX_MISTAKES))
             return
         try:
-            if text[0] == "#":
+            if text.startswith("@test"):
+                gathering.items.append(read_test(text, place))
+            elif text[0] == "#":
                 pending = read_directive(text, place, pending)
                 _read_include(file, place.span(0, len(text)), reading, gathering)
             else:
                 waiting, pending = pending, Pending()
-                if waiting.directives or not read_row(gathering, text, place):
-                    statement = read_statement(text, place, reading.dialect, reading.declared)
-                    _add(waiting.applied(statement), reading, gathering)
+                _read_statement(text, place, waiting, reading, gathering)
         except SyntaxMistake as error:
             reading.mistakes += error.diagnostics
     reading.mistakes += pending.left_over()
+
+
+def _read_statement(text: str, place: Place, waiting: Pending, reading: _Reading, gathering: Gathering) -> None:
+    language, vocabulary = reading.dialect, reading.vocabulary
+    if language == "standard" or language == "prac":
+        if not waiting.directives and read_row(gathering, text, place):
+            return
+        statement = read_statement(text, place, language, vocabulary.declared)
+    else:
+        statement = read_foreign(text, place, language, vocabulary.declared)
+    for meant in finished(waiting.applied(statement), vocabulary):
+        _add(meant, reading, gathering)
 
 
 def _read_include(file: File, span: Span, reading: _Reading, gathering: Gathering) -> None:
     path, included = file.included.get(span.start, ("", None))
     if included:
         source = included.code.source
-        program = Program(_read_files([included], reading), reading.dialect, Span(source, 0, len(source.text)))
+        program = Program(
+            _read_files([included], reading), _written(reading.dialect), Span(source, 0, len(source.text))
+        )
         gathering.items.append(tree.Include(path, program, span))
 
 
 def _add(statement: tree.Statement, reading: _Reading, gathering: Gathering) -> None:
-    if isinstance(statement, tree.PredicateDeclaration):
-        reading.declared.setdefault(statement.name, statement)
     if isinstance(statement, tree.FormulaStatement):
         if reading.dialect == "prac":
             reading.mistakes += prac_mistakes(statement.formula, reading.check)

@@ -7,15 +7,16 @@ from typing import Any, Literal, TypeAlias
 
 from mlnlite.source import Source, Span
 
-Language: TypeAlias = Literal["standard", "prac", "evidence"]
+Language: TypeAlias = Literal["standard", "prac", "evidence", "alchemy", "tuffy", "rockit", "lomrf"]
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A statement stands at `offset` of `source`."""
+    """A statement stands at `offset` of `source`, in a language."""
 
     source: Source
     offset: int
+    language: Language = "standard"
 
     def span(self, start: int, end: int) -> Span:
         """The span of characters `start` to `end` of the statement."""

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from mlnlite.errors import SyntaxMistake
 from mlnlite.source import Source, Span
 from mlnlite.syntax.grammar import parse_node
+from mlnlite.syntax.lower import without_functions
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
 from mlnlite.syntax.tree import Dialect, Formula
@@ -29,8 +30,8 @@ def parse_atom_query(text: str, dialect: Dialect) -> Formula:
     if not text.strip():
         raise SyntaxMistake([mistake("E150", None, "name a predicate, an atom such as `Smokes(Ann)`, or a formula")])
     start = len(text) - len(text.lstrip())
-    formula: Formula = parse_node(f"{dialect}_formula", text.strip(), Place(source, start), dialect)
-    return formula
+    formula = parse_node(f"{dialect}_formula", text.strip(), Place(source, start), dialect)
+    return without_functions(formula, hard=False)
 
 
 def split_queries(text: str) -> list[str]:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
+from mlnlite.errors import SyntaxMistake
 from mlnlite.syntax import tree
 from mlnlite.syntax.grammar import parse_node
+from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
 
 _TYPE = re.compile(r"[^\W\d][\w'-]*\s*=\s*\{")
@@ -20,8 +24,8 @@ _DECLARATION_MARK = re.compile(r"\*\s*\w|[^\W\d][\w'-]*\s*\([^()]*[\w']\s*[!?]\s
 
 def read_statement(
     text: str, place: Place, dialect: tree.Dialect, declared: Mapping[str, tree.PredicateDeclaration]
-) -> tree.TypeDeclaration | tree.PredicateDeclaration | tree.FormulaStatement:
-    """The statement `text`, which stands at `place`.
+) -> Any:  # noqa: ANN401
+    """The statement `text`, which stands at `place`; it may have raw nodes.
 
     A bare atom with plain words as arguments declares its predicate the first time, and again if it is the same; after
     that `P(x)` with other words is a formula without weight.
@@ -30,13 +34,68 @@ def read_statement(
         SyntaxMistake: it is no statement of the dialect.
     """
     rule = f"{dialect}_statement"
-    if _TYPE.match(text):
+    if _MACRO.match(text):
+        rule = "macro_definition"
+    elif _TYPE.match(text):
         rule = "type_declaration"
     elif _DECLARATION_MARK.match(text) or declares(text, declared):
         rule = "declaration"
-    node: tree.TypeDeclaration | tree.PredicateDeclaration | tree.FormulaStatement
-    node = parse_node(rule, text, place, dialect)
-    return node
+    return parse_node(rule, text, place, dialect)
+
+
+_MACRO = re.compile(r"\$\w+\s*=")
+_FUNCTION = re.compile(r"(?!(?i:exists?|forall|not|inf)\b)[^\W\d][\w-]*\s+(?!v\s)[^\W\d][\w-]*\s*\(")
+_COUNT = re.compile(r"\|([\w\s,]+)\|(.+?)(<=|>=|<|>|=)\s*(\d+)\s*\.?")
+_NAMED = re.compile(r"\*{0,2}[^\W\d][\w-]*\s*\(\s*\w+(?:\s+\w+)?\s*[!?]?(?:\s*,\s*\w+(?:\s+\w+)?\s*[!?]?)*\s*\)[*@+]*")
+_REFUSED = (
+    (re.compile(r"(?i:FD)\s*:"), "a functional dependency (`FD:`)", "mark the argument with `!` in the declaration"),
+    (re.compile(r".*:=.*"), "scoping (`:=`)", "write the condition into each formula"),
+    (
+        re.compile(r"[\d.-]+\s*:\s*[\d.-]+\s|:[\d.-]+\s"),
+        "a utility",
+        "utilities of decisions have no counterpart; drop them",
+    ),
+    (re.compile(r".*\)\s*\*\s*\(.*"), "a numeric feature (`(f) * (P(x) = 3.0)`)", "divide the numbers into bins"),
+    (re.compile(r"\[[\w\s=.+]*\].*"), "a label or prior in front of a formula", "drop it; `@` fixes a weight"),
+    (re.compile(r"sum\s*\(.*\)\s*:="), "a computed predicate", "compare the numbers in the formulas: `x + y = z`"),
+)
+
+
+def read_foreign(
+    text: str, place: Place, dialect: tree.Foreign, declared: Mapping[str, tree.PredicateDeclaration]
+) -> Any:  # noqa: ANN401
+    """The statement `text` of another system's language, which may have raw nodes.
+
+    Raises:
+        SyntaxMistake: it is no statement of the language, or has no counterpart here.
+    """
+    for pattern, construct, hint in _REFUSED:
+        if pattern.match(text):
+            raise SyntaxMistake([mistake("E110", place.span(0, len(text)), hint, construct=construct)])
+    count = _COUNT.fullmatch(text)
+    if count:
+        return _count(count, place, dialect)
+    if _TYPE.match(text):
+        return parse_node("type_declaration", text, place, dialect)
+    if _FUNCTION.match(text) and dialect in ("alchemy", "lomrf"):
+        return parse_node("function", text, place, dialect)
+    if _DECLARATION_MARK.match(text) or declares(text, declared) or (_NAMED.fullmatch(text) and _first(text, declared)):
+        return parse_node("declaration", text.rstrip("*@+"), place, dialect)
+    return parse_node("statement", text, place, dialect)
+
+
+def _first(text: str, declared: Mapping[str, tree.PredicateDeclaration]) -> bool:
+    return text.split("(")[0].strip("* ") not in declared
+
+
+def _count(match: re.Match[str], place: Place, dialect: tree.Foreign) -> tree.FormulaStatement:
+    """RockIt's `|x| f >= 2`: for each binding of the other variables, a hard bound."""
+    inside = replace(place, offset=place.offset + match.start(2))
+    body = parse_node("formula", match[2].rstrip(), inside, dialect)
+    variables = tuple(name.strip() for name in match[1].split(","))
+    span = place.span(0, len(match[0]))
+    formula = tree.Count(variables, body, match[3], int(match[4]), span)
+    return tree.FormulaStatement(formula, None, True, span=span)
 
 
 def declares(text: str, declared: Mapping[str, tree.PredicateDeclaration]) -> bool:

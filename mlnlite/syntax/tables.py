@@ -16,6 +16,7 @@ from mlnlite.errors import SyntaxMistake
 from mlnlite.source import Span
 from mlnlite.syntax import tree
 from mlnlite.syntax.grammar import parse_node
+from mlnlite.syntax.lower import statements_of
 from mlnlite.syntax.place import Place
 from mlnlite.syntax.walk import constants_of, variables_of, with_holes
 
@@ -114,7 +115,7 @@ def _weight(gathering: Gathering, text: str, place: Place) -> tree.WeightExpress
 def _without_spans(weight: tree.WeightExpression) -> tree.WeightExpression:
     """The same weight for another place: rows know where they stand themselves."""
     match weight:
-        case tree.Number():
+        case tree.Number() | tree.Size() | tree.NumberOf():
             return replace(weight, span=None)
         case tree.Call():
             return replace(weight, arguments=tuple(map(_without_spans, weight.arguments)), span=None)
@@ -129,9 +130,10 @@ def _read_first(gathering: Gathering, match: re.Match[str], place: Place, key: s
     gathering.keys[key] = None
     try:
         statement = parse_node(f"{gathering.dialect}_statement", match[0], place, gathering.dialect)
+        plain = [statement] == statements_of(statement)
     except SyntaxMistake:
         return False
-    if not can_gather(statement):
+    if not (plain and can_gather(statement)):
         return False
     cuts = [cut.span(1) for cut in _CONSTANT[gathering.dialect].finditer(match[2])]
     group = add(gathering, statement)
@@ -154,6 +156,8 @@ def can_gather(statement: tree.FormulaStatement) -> bool:
     """Whether a formula may become a row: soft, with a weight that may be learnt, and without `+`."""
     if statement.weight is None or statement.fixed or statement.unique:
         return False
+    if statement.weight.span is not None and statement.weight.span.text[-1:] == ":":
+        return False  # `p=0.8:` and `x:`
     return not any(variable.plus for variable in variables_of(statement.formula))
 
 

@@ -12,6 +12,12 @@ from typing import Literal, TypeAlias
 from mlnlite.source import Span
 
 Dialect: TypeAlias = Literal["standard", "prac"]
+"""How a tree is written: every tree has a text in these."""
+
+Foreign: TypeAlias = Literal["alchemy", "tuffy", "rockit", "lomrf"]
+"""Languages of other systems: they are read into a tree of the standard dialect."""
+
+AnyDialect: TypeAlias = Literal["standard", "prac", "alchemy", "tuffy", "rockit", "lomrf"]
 
 
 def _span() -> Span | None:
@@ -49,6 +55,19 @@ class Hole:
 Term: TypeAlias = Variable | Constant | Hole
 
 
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """`left operator right` of numbers that terms name, operator one of `+ - * / %`."""
+
+    operator: str
+    left: TermExpression
+    right: TermExpression
+    span: Span | None = _span()
+
+
+TermExpression: TypeAlias = Variable | Constant | Operation
+
+
 # --- formulas
 
 
@@ -67,6 +86,27 @@ class Equality:
 
     left: Term
     right: Term
+    span: Span | None = _span()
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """`x < y`, `u = t + 1`: constants compared as numbers; operator one of `< <= > >= = !=`."""
+
+    operator: str
+    left: TermExpression
+    right: TermExpression
+    span: Span | None = _span()
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """`count(f | x, y) <= 2`: for how many bindings of the variables `body` is true; operator as in `Comparison`."""
+
+    variables: tuple[str, ...]
+    body: Formula
+    operator: str
+    number: int
     span: Span | None = _span()
 
 
@@ -122,7 +162,7 @@ class Quantified:
     span: Span | None = _span()
 
 
-Formula: TypeAlias = Atom | Equality | Not | And | Or | Implies | Iff | Quantified
+Formula: TypeAlias = Atom | Equality | Comparison | Count | Not | And | Or | Implies | Iff | Quantified
 
 
 # --- weights
@@ -155,7 +195,23 @@ class Arithmetic:
     span: Span | None = _span()
 
 
-WeightExpression: TypeAlias = Number | Call | Arithmetic
+@dataclass(frozen=True, slots=True)
+class Size:
+    """`domSize(type)`: how many constants a type has."""
+
+    type: str
+    span: Span | None = _span()
+
+
+@dataclass(frozen=True, slots=True)
+class NumberOf:
+    """`x:`: the number that the constant of a variable names. Stands alone, never in an expression."""
+
+    variable: str
+    span: Span | None = _span()
+
+
+WeightExpression: TypeAlias = Number | Call | Arithmetic | Size | NumberOf
 
 
 # --- statements
@@ -228,6 +284,24 @@ class FormulaTable:
 
 
 @dataclass(frozen=True, slots=True)
+class Test:
+    """`@test given FACTS query FORMULA = 0.44 +- 0.001`: what `mlnlite test` verifies.
+
+    Attributes:
+        query: the formula whose probability is asked.
+        probability: what it is to be.
+        tolerance: how far from it is good.
+        given: facts, comma separated, as text.
+    """
+
+    query: str
+    probability: float
+    tolerance: float
+    given: str = ""
+    span: Span | None = _span()
+
+
+@dataclass(frozen=True, slots=True)
 class Include:
     """`#include "file"`, with what is in it."""
 
@@ -236,7 +310,22 @@ class Include:
     span: Span | None = _span()
 
 
-Statement: TypeAlias = TypeDeclaration | PredicateDeclaration | FormulaStatement | FormulaTable | Include
+Statement: TypeAlias = TypeDeclaration | PredicateDeclaration | FormulaStatement | FormulaTable | Test | Include
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """How a text was read.
+
+    Attributes:
+        dialect: the language it was read in.
+        reasons: why it was taken for that, empty if its user said so.
+        notes: what in it means something else than in the system it was written for.
+    """
+
+    dialect: AnyDialect
+    reasons: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,6 +335,7 @@ class Program:
     statements: tuple[Statement, ...]
     dialect: Dialect
     span: Span | None = _span()
+    origin: Origin | None = field(default=None, compare=False, repr=False)
 
 
 # --- evidence

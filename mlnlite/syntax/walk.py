@@ -20,6 +20,8 @@ def terms_of(formula: tree.Formula) -> Iterator[tree.Term]:
             case tree.Equality():
                 yield node.left
                 yield node.right
+            case tree.Comparison():
+                yield from comparison_variables(node)
             case tree.Not():
                 stack.append(node.operand)
             case tree.And() | tree.Or():
@@ -28,8 +30,30 @@ def terms_of(formula: tree.Formula) -> Iterator[tree.Term]:
                 stack += (node.head, node.body)
             case tree.Iff():
                 stack += (node.right, node.left)
-            case tree.Quantified():
+            case tree.Quantified() | tree.Count():
                 stack.append(node.body)
+
+
+def comparison_variables(node: tree.Comparison | tree.TermExpression) -> Iterator[tree.Variable]:
+    """The variables of a comparison, from left to right. Its constants are part of its shape, never holes."""
+    if isinstance(node, tree.Variable):
+        yield node
+    elif isinstance(node, tree.Comparison | tree.Operation):
+        yield from comparison_variables(node.left)
+        yield from comparison_variables(node.right)
+
+
+def map_comparison(node: tree.Comparison, change: Callable[[tree.Variable], tree.Term]) -> tree.Comparison:
+    """The comparison with its variables changed."""
+
+    def side(term: tree.TermExpression) -> tree.TermExpression:
+        if isinstance(term, tree.Operation):
+            return replace(term, left=side(term.left), right=side(term.right))
+        new = change(term) if isinstance(term, tree.Variable) else term
+        assert not isinstance(new, tree.Hole)
+        return new
+
+    return replace(node, left=side(node.left), right=side(node.right))
 
 
 def constants_of(formula: tree.Formula) -> list[tree.Constant]:
@@ -69,7 +93,9 @@ def map_terms(formula: tree.Formula, change: Callable[[tree.Term], tree.Term]) -
                 return replace(node, body=walk(node.body), head=walk(node.head))
             case tree.Iff():
                 return replace(node, left=walk(node.left), right=walk(node.right))
-            case tree.Quantified():
+            case tree.Quantified() | tree.Count():
                 return replace(node, body=walk(node.body))
+            case tree.Comparison():
+                return map_comparison(node, change)
 
     return walk(formula)

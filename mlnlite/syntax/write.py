@@ -45,6 +45,10 @@ def write_weight(weight: tree.WeightExpression) -> str:
             return _number(value)
         case tree.Call(function, arguments):
             return f"{function}({','.join(map(write_weight, arguments))})"
+        case tree.Size(type_name):
+            return f"domSize({type_name})"
+        case tree.NumberOf(variable):
+            return f"{variable}:"
         case tree.Arithmetic(operator, left, right):
             if left is None:
                 return f"{operator}({write_weight(right)})"
@@ -132,6 +136,12 @@ def _formula(formula: tree.Formula, word: _WriteWord) -> str:
         case tree.Equality():
             text = f"{word(formula.left, True)} = {word(formula.right, False)}"
             return f"({text})" if text.startswith("+") else text
+        case tree.Comparison(operator, left, right):
+            text = f"{_sum(left, word, True)} {operator} {_sum(right, word, False)}"
+            return f"({text})" if text.startswith("+") else text
+        case tree.Count(variables, body, operator, number):
+            names = ", ".join(word(tree.Variable(name), False) for name in variables)
+            return f"count({_formula(body, word)} | {names}) {operator} {number}"
         case tree.Not(tree.Atom() as atom):
             return "!" + _formula(atom, word)
         case tree.Not(operand):
@@ -148,6 +158,26 @@ def _formula(formula: tree.Formula, word: _WriteWord) -> str:
             names = ",".join(word(tree.Variable(name), False) for name in variables)
             return f"{quantifier.upper()} {names} ({_formula(body, word)})"
     assert_never(formula)
+
+
+def _sum(term: tree.TermExpression, word: _WriteWord, left: bool) -> str:
+    """A side of a comparison; `left`: it starts a formula."""
+    if not isinstance(term, tree.Operation):
+        return word(term, left)
+    inner = [_sum(side, word, left and i == 0) for i, side in enumerate((term.left, term.right))]
+    texts = [
+        f"({t})" if _needs_parentheses(side, term, i) else t
+        for i, (t, side) in enumerate(zip(inner, (term.left, term.right), strict=True))
+    ]
+    return f"{texts[0]} {term.operator} {texts[1]}"
+
+
+def _needs_parentheses(side: tree.TermExpression, outer: tree.Operation, place: int) -> bool:
+    if not isinstance(side, tree.Operation):
+        return False
+    if place == 1:
+        return True
+    return side.operator in "+-" and outer.operator in "*/%"
 
 
 def _part(operand: tree.Formula, word: _WriteWord) -> str:
@@ -190,6 +220,9 @@ def _statement(
             yield from _weighted(statement, word, declared)
         case tree.FormulaTable():
             yield from _rows(statement, word)
+        case tree.Test(query, probability, tolerance, given):
+            condition = f"given {given} " if given else ""
+            yield f"@test {condition}query {query} = {probability!r} +- {tolerance!r}"
         case tree.Include(path):
             yield f"#include <{path}>" if '"' in path else f'#include "{path}"'
         case _:
@@ -208,7 +241,9 @@ def _weighted(
     if statement.fixed and statement.weight is None:
         yield "#fixweight"
     text = _formula(statement.formula, word)
-    if statement.weight is not None:
+    if isinstance(statement.weight, tree.NumberOf):
+        yield f"{word(tree.Variable(statement.weight.variable), False)}: {text}"
+    elif statement.weight is not None:
         yield f"{'@' if statement.fixed else ''}{write_weight(statement.weight)} {text}"
     elif statement.hard:
         yield f"{text}."
