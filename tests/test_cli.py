@@ -17,8 +17,8 @@ from click.testing import CliRunner
 
 import mlnlite as ml
 from mlnlite import cli
-from mlnlite.cli.learn import DEFAULT_SD
-from mlnlite.learn.weights import PRIOR_SD
+from mlnlite.cli.learning import DEFAULT_SD
+from mlnlite.learn.prior import PRIOR_SD
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / ".." / "shared" / "data"
