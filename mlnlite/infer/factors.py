@@ -41,6 +41,7 @@ class Factors(NamedTuple):
         value: log-weights, `FORBIDDEN` for hard formulas that are violated.
         weight: shape (n_factors,), index of each one's weight in the network.
         counted: shape (n_factors,), whether the state is a number of true literals.
+        grouped: shape (n_factors,), whether it was a counting factor in the network.
     """
 
     atom: Int64
@@ -58,6 +59,7 @@ class Factors(NamedTuple):
     value: Float
     weight: Int32
     counted: Bool
+    grouped: Bool
 
     @property
     def n_atoms(self) -> int:
@@ -90,7 +92,7 @@ class Factors(NamedTuple):
 class _Rows:
     """Factors of one kind: atoms (n, k) of the network, steps (n, k), base (n,), worth (n, n_states), weight (n,).
 
-    Also whether their state is a number of true literals.
+    Also whether their state is a number of true literals, and whether they were counting factors.
     """
 
     atoms: Int64
@@ -99,11 +101,12 @@ class _Rows:
     worth: Float
     weight: Int32
     counted: bool = True
+    grouped: bool = False
 
     def pick(self, which: Bool) -> _Rows:
         """Some of the factors."""
         steps, weight = self.steps[which], self.weight[which]
-        return _Rows(self.atoms[which], steps, self.base[which], self.worth[which], weight, self.counted)
+        return _Rows(self.atoms[which], steps, self.base[which], self.worth[which], weight, self.counted, self.grouped)
 
 
 def factors_of(network: Network, variables: Bool) -> Factors:
@@ -146,6 +149,7 @@ def factors_of(network: Network, variables: Bool) -> Factors:
         value,
         _joined([r.weight for r in kinds], np.int32),
         np.concatenate([np.zeros(0, np.bool_), *(np.full(len(r.base), r.counted) for r in kinds)]),
+        np.concatenate([np.zeros(0, np.bool_), *(np.full(len(r.base), r.grouped) for r in kinds)]),
     )
 
 
@@ -162,7 +166,7 @@ def _kinds(network: Network) -> Iterator[_Rows]:
         true[0] = c.negated
         yield _rows(network, c.literals, true.astype(np.int64), c.weight, c.count)
     for n in network.counts:
-        yield _rows(network, n.literals, n.true, n.weight, n.count)
+        yield replace(_rows(network, n.literals, n.true, n.weight, n.count), grouped=True)
     for t in network.tables:
         k = t.atoms.shape[1]
         literals = (t.atoms + 1).astype(np.int32)

@@ -2,6 +2,8 @@
 
 Blocked Gibbs sampling (Geman and Geman 1984) gives a functional block its value at once. What is averaged is not
 whether an atom is true but how probable that is given all others (Rao-Blackwell; Gelfand and Smith 1990).
+Where atoms softly exclude each other (a counting factor), a further move changes which of them is the true one: one
+flip at a time would have to pass through worlds with two, or none.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ class Chain:
         factors: of which.
         true: shape (n_variables,), the true atom of each variable, -1 for none.
         state: shape (n_factors,), of each factor.
+        groups: shape (n_groups, n), atoms of which most often one is true, -1 after the last of a group.
         rng: where its chance comes from.
         beta: what log-weights are multiplied by.
         hotter: chains with ever smaller beta that it may trade worlds with.
@@ -32,6 +35,7 @@ class Chain:
     factors: Factors
     true: Int32
     state: Int32
+    groups: Int32 = field(repr=False)
     rng: np.random.Generator = field(repr=False)
     beta: float = 1.0
     hotter: tuple[Chain, ...] = ()
@@ -62,12 +66,24 @@ def start(factors: Factors, truth: Bool, rng: np.random.Generator, beta: float =
     owner = owners(factors)
     true = np.full(factors.n_variables, -1, np.int32)
     true[owner[truth]] = np.flatnonzero(truth)
-    return Chain(factors, true, states(factors, true), rng, beta)
+    return Chain(factors, true, states(factors, true), groups_of(factors), rng, beta)
 
 
 def owners(factors: Factors) -> Int32:
     """Variable of each atom."""
     return np.repeat(np.arange(factors.n_variables, dtype=np.int32), np.diff(factors.first))
+
+
+def groups_of(factors: Factors) -> Int32:
+    """The atoms of each counting factor over variables of two values: shape (n_groups, n), padded with -1."""
+    binary = (np.diff(factors.first) == 1)[owners(factors)] & factors.none[owners(factors)]
+    size = np.diff(factors.scope)
+    free = np.logical_and.reduceat(binary[factors.member], factors.scope[:-1]) if len(size) else np.zeros(0, np.bool_)
+    chosen = np.flatnonzero(free & factors.grouped)
+    groups = np.full((len(chosen), int(size[chosen].max(initial=1))), -1, np.int32)
+    for row, i in zip(groups, chosen.tolist(), strict=True):
+        row[: size[i]] = factors.member[factors.scope[i] : factors.scope[i + 1]]
+    return groups
 
 
 def states(factors: Factors, true: Int32) -> Int32:
@@ -97,12 +113,16 @@ def gibbs_draws(chain: Chain, n: int, watched: Int32) -> Sums:
         watched: shape (n_watched, 2), variables and atoms to follow.
     """
     from mlnlite.infer.gibbs_kernel import sweep
+    from mlnlite.infer.swap_kernel import swap
 
-    n_variables = chain.factors.n_variables
-    sums = Sums(np.zeros((2, chain.factors.n_atoms)), np.zeros((n, len(watched)), np.bool_))
-    step = max(1, _AT_ONCE // n_variables)
+    f, rng, n_groups = chain.factors, chain.rng, len(chain.groups)
+    sums = Sums(np.zeros((2, f.n_atoms)), np.zeros((n, len(watched)), np.bool_))
+    owner = owners(f) if n_groups else np.zeros(0, np.int32)
+    step = 1 if n_groups else max(1, _AT_ONCE // f.n_variables)
     for begin in range(0, n, step):
         seen = sums.seen[begin : begin + step]
-        uniform = chain.rng.random((len(seen), n_variables))
-        sweep(chain.factors, chain.state, chain.true, uniform, chain.beta, sums.total, watched, seen)
+        if n_groups:
+            swap(f, chain.state, chain.true, chain.groups, owner, rng.random(n_groups), chain.beta)
+        uniform = rng.random((len(seen), f.n_variables))
+        sweep(f, chain.state, chain.true, uniform, chain.beta, sums.total, watched, seen)
     return sums

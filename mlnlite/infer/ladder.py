@@ -92,7 +92,7 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
     solution.n_components = found.n_components
     _enter_exact(solution, np.arange(len(atoms)), found.probability[atoms], [found.method[a] for a in atoms.tolist()])
     _formulas_exactly(network, solution, found, (len(atoms), formulas), approach)
-    jobs = list(_jobs(found, (atoms, formulas), np.flatnonzero(np.isnan(solution.probability))))
+    jobs = sorted(_jobs(found, (atoms, formulas), np.flatnonzero(np.isnan(solution.probability))), key=_n_rows)
     deadline = in_seconds(PATIENCE if approach.time_limit is None else approach.time_limit)
     for i, (components, rows) in enumerate(jobs):
         variables = np.zeros(network.n_variables, np.bool_)
@@ -100,6 +100,11 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
         limited = replace(approach, time_limit=deadline.left / (len(jobs) - i))
         _enter_sample(network, solution, variables, (atoms, formulas, rows), limited)
     return solution
+
+
+def _n_rows(job: tuple[Int64, Int64]) -> int:
+    """How much there is to estimate: small ones go first and leave their time to large ones."""
+    return len(job[1])
 
 
 def _nothing_yet(n: int) -> Solution:

@@ -27,7 +27,7 @@ Ending = Literal["precise", "time", "interrupted"]
 
 LEAST_SIZE = 400.0
 MOST_R_HAT = 1.01
-_FIRST_LOOK, _LATER = 64, 1.4
+_FIRST_LOOK, _LATER = 64, 1.6
 _AT_ONCE, _FEWEST = 0.2, 8
 
 
@@ -164,8 +164,13 @@ def _points(run: Run, chain: Chain) -> Float:
     return counts
 
 
-def look(run: Run) -> Look:
-    """What the traces say so far."""
+def look(run: Run, precision: float = np.inf) -> Look:
+    """What the traces say so far.
+
+    Args:
+        run: chains.
+        precision: if errors are larger than this, R-hat is left out (nan).
+    """
     traces = run.traces
     series = traces.means[:, traces.kept]
     error, entries = standard_errors(series)
@@ -175,8 +180,12 @@ def look(run: Run) -> Look:
     size = entries / np.maximum(ratio, 1e-300)
     n_draws = len(series) * series.shape[1] * traces.batch
     size = np.where(variance > 0, np.minimum(size, n_draws * np.log10(n_draws)), n_draws)
-    agree = np.where(variance > 0, r_hat(series, ratio), 1.0)
     moved = np.minimum(mean, 1 - mean) * n_draws >= 1.0
+    agree = np.full(len(mean), np.nan)
+    if (error <= precision).all() and (precision == np.inf or (size[moved] >= LEAST_SIZE).all()):
+        changes = moved & (variance > 0)
+        agree = np.where(moved, 1.0, np.nan)
+        agree[changes] = r_hat(series[:, :, changes], ratio[changes])
     return Look(mean, error, agree, size, moved)
 
 
@@ -196,7 +205,7 @@ def until_precise(run: Run, precision: float, deadline: Deadline) -> tuple[Look,
         advance(run, n)
         n = max(1, min(32, int(n * _AT_ONCE / (perf_counter() - begin))))
         if run.traces.n_draws >= due:
-            found = look(run)
+            found = look(run, precision)
             if is_enough(found, precision):
                 return found, "precise"
             due = int(due * _LATER)

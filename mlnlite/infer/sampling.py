@@ -19,6 +19,7 @@ from mlnlite.infer.worlds import can_differ, start_worlds
 from mlnlite.model.formulas import Expression
 
 STEEP = 4.0
+DISAGREE = 1.05
 _WARM_UP = 32
 _NAMES = {"gibbs": "Gibbs sampling", "mcsat": "MC-SAT", "tempering": "parallel tempering"}
 _NORMAL = 1.959963984540054
@@ -104,7 +105,9 @@ def sample(
     with interruptible(deadline):
         whole = deadline if sampler else deadline.within(deadline.left / 2)
         run, found, ending = _run(network, factors, asked, chosen, effort, whole)
-        if sampler is None and ending == "time":
+        if sampler is None and ending == "time" and _worst(found) <= DISAGREE:
+            found, ending = until_precise(run, effort.precision, deadline)
+        elif sampler is None and ending == "time":
             second: Sampler = "mcsat" if chosen == "gibbs" else "tempering"
             again = _run(network, factors, asked, second, effort, deadline)
             if _worst(again[1]) < _worst(found):
@@ -116,7 +119,7 @@ def best_sampler(factors: Factors) -> Sampler:
     """MC-SAT where a factor over several atoms is hard or nearly so, else Gibbs sampling, which is faster there."""
     rows, index = np.unique(factors.row, return_inverse=True)
     highest = np.maximum.reduceat(factors.value, rows)[index] if len(rows) else np.zeros(0)
-    steep = (highest - factors.lowest)[np.diff(factors.scope) > 1] >= STEEP
+    steep = (highest - factors.lowest)[(np.diff(factors.scope) > 1) & ~factors.grouped] >= STEEP
     return "mcsat" if steep.any() else "gibbs"
 
 
@@ -141,8 +144,8 @@ def _run(
 
 
 def _worst(found: Look) -> float:
-    """The largest R-hat."""
-    return float(np.nanmax(found.r_hat, initial=1.0))
+    """The largest R-hat; infinity if nothing moved at all."""
+    return float(np.nanmax(found.r_hat, initial=1.0)) if found.moved.any() else np.inf
 
 
 def _estimates(

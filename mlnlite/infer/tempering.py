@@ -20,7 +20,7 @@ def with_ladder(chain: Chain) -> Chain:
     """A chain with hotter ones beside it, all in its present world."""
     rngs = chain.rng.spawn(len(LADDER))
     hotter = (
-        Chain(chain.factors, chain.true.copy(), chain.state.copy(), rng, beta)
+        replace(chain, true=chain.true.copy(), state=chain.state.copy(), rng=rng, beta=beta)
         for rng, beta in zip(rngs, LADDER, strict=True)
     )
     return replace(chain, hotter=tuple(hotter))

@@ -9,7 +9,7 @@ import numpy as np
 from mlnlite.ground.network import Float, Float32
 
 ROOM = 1 << 25
-MOST = 1024
+MOST = 512
 
 
 @dataclass(slots=True)
