@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from mlnlite.domains.handover.knowledge.words import environments_of, level_constant, role_of
+from mlnlite.domains.handover.knowledge.words import environments_of, level_constant, made_for, role_of
 from mlnlite.domains.handover.objects import HandoverObject, region_of
 
 Fact = tuple[str, ...]
@@ -28,7 +28,9 @@ def object_facts(thing: HandoverObject, task: str) -> tuple[Fact, ...]:
         ("hasAffordance", THING, task),
     ]
     looks += [("canBeFound", THING, place) for place in environments_of(thing)]
-    return (*looks, *(("hasPart", THING, str(i + 1), role_of(thing, r)) for i, r in enumerate(thing.regions)))
+    roles = [(str(i + 1), role_of(thing, region)) for i, region in enumerate(thing.regions)]
+    looks += [("hasPart", THING, number, role) for number, role in roles]
+    return (*looks, *(("suits", THING, number) for number, role in roles if made_for(role, task)))
 
 
 def level_facts(level: str | None) -> tuple[Fact, ...]:
@@ -55,3 +57,16 @@ def fact_text(fact: Fact) -> str:
 def databases_text(instances: Sequence[Sequence[Fact]]) -> str:
     """The text of a `.db` file with one database for each instance."""
     return "---\n".join("".join(f"{fact_text(fact)}\n" for fact in facts) for facts in instances)
+
+
+def gathered_text(instances: Sequence[Sequence[Fact]]) -> str:
+    """The same instances in few databases, those of equal level together, each about an object of its own.
+
+    No formula of the domain speaks of two objects, so this says the same in less text.
+    """
+    groups: dict[tuple[Fact, ...], list[str]] = {}
+    for i, facts in enumerate(instances):
+        shared = tuple(fact for fact in facts if THING not in fact[1:2])
+        lines = groups.setdefault(shared, [f"{fact_text(fact)}\n" for fact in shared])
+        lines += [f"{fact_text((fact[0], f'{THING}{i}', *fact[2:]))}\n" for fact in facts if fact not in shared]
+    return "---\n".join("".join(lines) for lines in groups.values())

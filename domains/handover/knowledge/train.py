@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import mlnlite as ml
-from mlnlite.domains.handover.knowledge.facts import Fact, databases_text, kept
+from mlnlite.domains.handover.knowledge.facts import Fact, gathered_text, kept
 from mlnlite.domains.handover.knowledge.words import asked_predicates
 
 PRIOR_SD = 1.0
@@ -25,7 +25,7 @@ def train(model: ml.Model, instances: Sequence[Sequence[Fact]], *, prior: object
         MlnError: a fact does not fit the model, or there is nothing to learn from.
     """
     rows = [kept(facts, model.predicates) for facts in instances]
-    data = ml.evidence_from_text(databases_text(rows), model=model)
+    data = ml.evidence_from_text(gathered_text(rows), model=model)
     return ml.learn(model, data, predict=asked_predicates(model), prior=prior or ml.Hierarchical())
 
 

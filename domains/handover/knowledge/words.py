@@ -91,6 +91,11 @@ def role_of(thing: HandoverObject, region: str) -> str:
     return str(own.get(region, by_name.get(region, "body")))
 
 
+def made_for(role: str, task: str) -> bool:
+    """Whether parts of a role are made for a task."""
+    return task in roles_table()["suits"].get(role, ())
+
+
 def environments_of(thing: HandoverObject) -> tuple[str, ...]:
     """Where an object is found."""
     table = roles_table()

@@ -1,0 +1,1 @@
+"""Evaluation: models against baselines on unseen objects, on the published rows, and of the handovers themselves."""
