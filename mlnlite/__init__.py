@@ -48,6 +48,8 @@ if TYPE_CHECKING:
     from mlnlite.learn.prior import Gaussian as Gaussian
     from mlnlite.learn.prior import Hierarchical as Hierarchical
     from mlnlite.learn.prior import Laplace as Laplace
+    from mlnlite.learn.structure import Structure as Structure
+    from mlnlite.learn.structure import find_rules as find_rules
     from mlnlite.learn.uncertainty import Uncertainty as Uncertainty
     from mlnlite.learn.uncertainty import uncertainty as uncertainty
     from mlnlite.learn.weights import learn as learn
@@ -88,6 +90,8 @@ _HOMES = {
     "Gaussian": "mlnlite.learn.prior",
     "Hierarchical": "mlnlite.learn.prior",
     "Laplace": "mlnlite.learn.prior",
+    "Structure": "mlnlite.learn.structure",
+    "find_rules": "mlnlite.learn.structure",
     "Uncertainty": "mlnlite.learn.uncertainty",
     "uncertainty": "mlnlite.learn.uncertainty",
     "Evaluation": "mlnlite.learn.evaluate",

@@ -19,6 +19,8 @@ from mlnlite.cli.terminal import working
 if TYPE_CHECKING:
     from mlnlite.learn.learned import LearnedModel, Objective
     from mlnlite.learn.report import Report
+    from mlnlite.model.evidence import Evidence
+    from mlnlite.model.model import Model
     from mlnlite.syntax.tree import Dialect
 
 
@@ -32,6 +34,7 @@ class _Options(TypedDict):
     prior_sd: float | None
     prior: str
     predict: tuple[str, ...]
+    structure: bool
     report: Literal["sandwich", "information", "bootstrap"] | None
     seed: int
     time_limit: float | None
@@ -53,6 +56,11 @@ class _Inputs:
     multiple=True,
     metavar="NAMES",
     help="Predicates to predict from the others (conditional likelihoods). By default all.",
+)
+@click.option(
+    "--structure",
+    is_flag=True,
+    help="First add rules that the data show; needs `--predict`. All other predicates are conditions.",
 )
 @click.option(
     "--report",
@@ -95,6 +103,8 @@ def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report |
     with working("reading"):
         model = ml.read_model(*inputs.models, dialect=options["dialect"])
         databases = ml.read_evidence(*inputs.databases, model=model)
+    if options["structure"]:
+        model = _with_rules(model, databases, names(options["predict"]), options["seed"])
     with working("learning"):
         learned = ml.learn(
             model,
@@ -112,6 +122,19 @@ def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report |
 
     with working("measuring"):
         return learned, report(learned, databases, method=method, seed=options["seed"])
+
+
+def _with_rules(model: Model, databases: Evidence, predict: list[str], seed: int) -> Model:
+    """The model with the rules that were found, which are shown."""
+    import mlnlite as ml
+
+    if not predict:
+        raise click.UsageError("--structure needs --predict: what the rules are to conclude")
+    given = [name for name in model.predicates if name not in predict]
+    with working("looking for rules"):
+        found = ml.find_rules(model, databases, predict=predict, given=given, seed=seed)
+    click.echo(f"{found}\n", err=True)
+    return found.model
 
 
 def learned_text(learned: LearnedModel) -> str:
