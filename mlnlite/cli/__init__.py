@@ -19,6 +19,11 @@ COMMANDS = {
     "query": "Ask a model: probabilities, or the most probable world.",
     "ground": "Ground a model: what evidence leaves open, or what that would take; export it.",
     "score": "Score a world: its log-weight and what it pays, formula by formula.",
+    "fmt": "Write models in one style, keeping comments.",
+    "lint": "Warn of what is allowed and probably not meant.",
+    "convert": "Rewrite a model in our dialects, and list what changes.",
+    "diff": "Compare two models: formulas matched, weights side by side.",
+    "test": "Run the @test lines of a model.",
     "evaluate": "Measure how well a model predicts what databases already say.",
     "crossvalidate": "Measure how well a model predicts databases that it was not learnt from.",
 }

@@ -16,7 +16,7 @@ from mlnlite.errors import Diagnostic
 if TYPE_CHECKING:
     from mlnlite.model.evidence import Evidence
     from mlnlite.model.model import Model
-    from mlnlite.syntax.tree import Dialect
+    from mlnlite.syntax.tree import Dialect, Origin
 
 WIDTH = 60
 MANY = 20
@@ -89,6 +89,8 @@ def _n_weights(summary: _Summary) -> int:
 
 
 def _sections(summary: _Summary, *, verbose: bool) -> Iterator[str]:
+    if verbose and summary.model.origin:
+        yield f"dialect\n{_origin(summary.model.origin)}"
     yield f"types\n{_types(summary, WIDTH if not verbose else 10**9)}"
     yield f"predicates\n{_predicates(summary)}"
     if summary.rows:
@@ -101,6 +103,12 @@ def _sections(summary: _Summary, *, verbose: bool) -> Iterator[str]:
         yield "\n\n".join(map(str, summary.warnings))
 
 
+def _origin(origin: Origin) -> str:
+    """The dialect, why it was taken for it, and what differs from the system it belongs to."""
+    reasons = origin.reasons or ("it was asked for",)
+    return "\n".join(f"  {line}" for line in (f"{origin.dialect}: {'; '.join(reasons)}", *origin.notes))
+
+
 def _types(summary: _Summary, width: int) -> str:
     types = (summary.evidence or summary.model).types.values()
     rows = [[t.name, f"{len(t.constants):,}", shortened(t.constants, width)] for t in types]
@@ -110,6 +118,8 @@ def _types(summary: _Summary, width: int) -> str:
 def _predicates(summary: _Summary) -> str:
     rows = []
     for predicate in summary.model.predicates.values():
+        if predicate.comparison:
+            continue
         facts = summary.evidence.facts[predicate.name] if summary.evidence else None
         rows.append([str(predicate), _counted(len(facts.truth), "fact") if facts else ""])
     return table(rows, "<<")
@@ -135,11 +145,13 @@ def _as_dict(summary: _Summary) -> dict[str, object]:
     types = (evidence or summary.model).types.values()
     templates = zip(summary.rows, summary.model.templates, strict=True)
     return {
-        "dialect": summary.model.dialect,
+        "dialect": summary.model.origin.dialect if summary.model.origin else summary.model.dialect,
+        "reasons": list(summary.model.origin.reasons) if summary.model.origin else [],
         "types": {t.name: list(t.constants) for t in types},
         "predicates": [
             {"declaration": str(p), "n_facts": len(evidence.facts[p.name].truth) if evidence else None}
             for p in summary.model.predicates.values()
+            if not p.comparison
         ],
         "templates": [{"formula": t.text, "n_rows": n, "hard": t.hard, "fixed": t.fixed} for n, t in templates],
         "n_weights": _n_weights(summary),

@@ -42,8 +42,9 @@ def format_option(*names: str) -> Callable[[Command], Command]:
 
 dialect_option = click.option(
     "--dialect",
-    type=click.Choice(["standard", "prac"]),
-    help="`standard`: variables start lower case; `prac`: variables are written ?x. By default found out.",
+    type=click.Choice(["standard", "prac", "alchemy", "tuffy", "rockit", "lomrf"]),
+    help="`standard`: variables start lower case; `prac`: variables are written ?x; others: files of these systems. "
+    "By default found out; `mlnlite check -v` says why.",
 )
 output_option = click.option(
     "-o",
@@ -52,8 +53,8 @@ output_option = click.option(
     callback=_writable,
     help="File to write; it appears when it is complete. By default standard output.",
 )
-TOGETHER = "Facts that are known. Several files describe one world together."
-APART = "Facts that are known. Each database, in files or between `---`, is a world of its own."
+TOGETHER = "Facts that are known: .db files, NAME=TABLE (CSV, Parquet, ...), .toml mappings; together one world."
+APART = "Facts that are known: .db files, each database a world of its own; NAME=TABLE and .toml mappings, one world."
 
 
 def evidence_option(text: str) -> Callable[[Command], Command]:

@@ -1,4 +1,4 @@
-"""What follows from the constants of evidence: the facts of comparisons, and whether constants are what a model needs."""
+"""What follows from the constants of evidence: facts of comparisons; and whether constants are what a model needs."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def compared(model: Model, types: Mapping[str, Type], present: Mapping[str, NDAr
 
 
 def verify_constants(model: Model, types: Mapping[str, Type]) -> Iterator[Diagnostic]:
-    """What is wrong with the constants: compared or used as a weight without being numbers, or more than were counted."""
+    """What is wrong with constants: compared or used as weights without being numbers, or more than were counted."""
     yield from number_mistakes([p for p in model.predicates.values() if p.comparison], types)
     for template in model.templates:
         if template.number is None:

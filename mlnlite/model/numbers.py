@@ -70,8 +70,9 @@ def comparison_predicate(formula: tree.Comparison, place: Mapping[str, int], typ
 
 
 def holds(comparison: tree.Comparison, values: Sequence[Float]) -> Bool:
-    """Where a comparison holds, with numbers (which broadcast) for its variables `x0`, `x1`, ...; where it has no value
-    (division by zero) it does not.
+    """Where a comparison holds, with numbers (which broadcast) for its variables `x0`, `x1`, ...
+
+    Where it has no value (division by zero) it does not hold.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         left, right = (_value(side, values) for side in (comparison.left, comparison.right))

@@ -43,8 +43,8 @@ class _Variable:
 class FormulaTyper:
     """Types one formula. `mistakes` collects what is wrong; the result is only good if nothing was added to it.
 
-    Free variables come in order of appearance; a hole is a free variable, its number in `holes`. A comparison of numbers
-    becomes an atom of a predicate of its own, which is added to `comparisons`.
+    Free variables come in order of appearance; a hole is a free variable, its number in `holes`. A comparison of
+    numbers becomes an atom of a predicate of its own, which is added to `comparisons`.
     """
 
     predicates: Mapping[str, Predicate]

@@ -2,8 +2,8 @@
 
 A term that is not a variable or a constant (`P(t + 1)`, `P(motherOf(x))`) becomes a variable `u` with a condition
 (`u = t + 1`, `motherOf(x, u)`). The condition joins the formula that binds the term's variables: with `^` where the
-formula is soft, so that a grounding counts as true only if the term has a value, and with `=>` where it is hard, so that
-one without a value forbids nothing.
+formula is soft, so that a grounding counts as true only if the term has a value, and with `=>` where it is hard, so
+that one without a value forbids nothing.
 """
 
 from __future__ import annotations

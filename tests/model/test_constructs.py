@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from tests import brute
 
 import mlnlite as ml
+from tests import brute
 
 NUMBERS = "time = {1, ..., 4}\nP(time)\nQ(time)\n0.3 P(t)\n-0.2 Q(t)\n"
 

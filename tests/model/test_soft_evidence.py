@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from tests import brute
 
 import mlnlite as ml
+from tests import brute
 
 MODEL = """
 Smokes(person)
