@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mlnlite.domains.handover import load
+from mlnlite.domains.handover.cli_demo import demo
+from mlnlite.domains.handover.cli_evaluate import evaluate
+from mlnlite.domains.handover.cli_execute import execute
 from mlnlite.domains.handover.cli_knowledge import dataset, query, train
 from mlnlite.domains.handover.cli_study import study
 
@@ -206,5 +209,5 @@ Written by `mlnlite handover compare --robot {robot} --posture {posture} --out d
 {table}"""
 
 
-for _command in (study, dataset, train, query):
+for _command in (study, dataset, train, query, evaluate, execute, demo):
     handover.add_command(_command)

@@ -18,8 +18,9 @@ from mlnlite.domains.handover.objects import AFFORDANCES, CATEGORIES, MATERIALS,
 from mlnlite.domains.handover.tables import choose, read_table
 
 FOLDER: Traversable = files("mlnlite.domains.handover.knowledge")
-VARIANTS = ("handover", "backoff", "paper", "affordance")
-"""Models of this folder: the domain's own; the published words with lower-order templates; the authors' single
+VARIANTS = ("handover", "backoff", "pairs", "paper", "affordance")
+"""Models of this folder: the domain's own; the published words with lower-order templates, and with
+all pairs; the authors' single
 conjunction; the templates of 2019."""
 LEVELS = {"H": "level_1", "H-M": "level_2", "L-M": "level_3", "L": "level_4"}
 METHODS = {"A": "far", "B": "midway", "ours": "ours"}

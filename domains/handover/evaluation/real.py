@@ -1,0 +1,136 @@
+"""The authors' rows: rows and a scheme in, held-out predictions of our model and of the baselines out.
+
+Which templates and prior our model takes is chosen inside each training half, by an inner cross-validation that holds
+out whole groups as the outer one does; the test half never plays a part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from mlnlite.domains.handover.evaluation import models
+from mlnlite.domains.handover.evaluation.metrics import log_loss
+from mlnlite.domains.handover.evaluation.models import Float, Question, Row
+from mlnlite.domains.handover.evaluation.published import PublishedRow, blocks, keys, known_facts, labels
+from mlnlite.domains.handover.evaluation.schemes import grouped_folds
+from mlnlite.domains.handover.knowledge.words import read_knowledge
+
+_BASE = ("hasShape", "isA", "hasAffordance")
+_LOOKS = ("hasMaterial", "hasTexture", "canBeFound")
+REGION = Question("graspRegion", ("1", "2", "3"), _BASE + _LOOKS)
+METHOD = Question("handover", ("far", "midway", "ours"), _BASE + _LOOKS + ("armMobility",))
+GRID: tuple[tuple[str, float], ...] = (("backoff", 0.1), ("backoff", 0.15), ("backoff", 0.3), ("pairs", 0.2),
+                                       ("pairs", 0.4))  # fmt: skip
+"""Templates and standard deviations of the prior that the inner cross-validation chooses from."""
+BASELINES = {"majority": models.majority, "look-up table": models.lookup, "naive Bayes": models.naive_bayes,
+             "pairwise logistic": models.logistic_pairwise}  # fmt: skip
+OURS = "ours"
+LEVELS = ("filled", "unknown where missing", "left out")
+"""What to do about the 74 missing levels."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOut:
+    """Held-out predictions of one question.
+
+    Attributes:
+        scheme: `key` or `block`.
+        question: what was predicted.
+        truth: class of each row, shape (n,).
+        groups: what was held out together.
+        found: probabilities by model, shape (n, classes).
+        chosen: how often each entry of the grid was chosen.
+    """
+
+    scheme: str
+    question: Question
+    truth: np.ndarray  # type: ignore[type-arg]
+    groups: tuple[str, ...]
+    found: Mapping[str, Float]
+    chosen: Mapping[str, int]
+
+
+def rows_of(published: Sequence[PublishedRow], *, looks: bool = True, levels: str = "filled") -> list[Row]:
+    """Rows for the models, with or without material, texture and environment; see `LEVELS`."""
+    out = []
+    for row in published:
+        known = levels == "filled" or (levels == "unknown where missing" and not row.gap)
+        facts = known_facts(row, looks=looks, level=known)
+        out.append(Row(facts, tuple((name, value) for name, _, value in labels(row))))
+    return out
+
+
+def held_out(
+    published: Sequence[PublishedRow], scheme: str, *, seed: int = 0, workers: int = 2, rows: Sequence[Row] | None = None
+) -> tuple[HeldOut, HeldOut]:
+    """Ten-fold predictions of region and method, all models on the same folds.
+
+    Args:
+        published: the authors' rows.
+        scheme: `key`, held-out combinations of shape, category and task; or `block`, held-out runs.
+        seed: of the folds.
+        workers: processes.
+        rows: what the models see; by default everything.
+    """
+    rows = rows_of(published) if rows is None else rows
+    groups = (keys if scheme == "key" else blocks)(published)
+    folds = grouped_folds(groups, [row.method for row in published], seed=seed)
+    work = partial(_fold, list(rows), groups)
+    with ProcessPoolExecutor(workers) as pool:
+        parts = list(pool.map(work, folds))
+    return _gathered(scheme, REGION, rows, groups, parts), _gathered(scheme, METHOD, rows, groups, parts)
+
+
+_Part = tuple[np.ndarray, dict[tuple[str, str], Float], dict[str, str]]  # type: ignore[type-arg]
+
+
+def _fold(rows: list[Row], groups: Sequence[str], test: np.ndarray) -> _Part:  # type: ignore[type-arg]
+    inside = set(test.tolist())
+    training = [i for i in range(len(rows)) if i not in inside]
+    halves = [rows[i] for i in training], [rows[i] for i in test]
+    found = {(q.predicate, name): rival(*halves, q) for q in (REGION, METHOD) for name, rival in BASELINES.items()}
+    chosen = _choose(halves[0], [groups[i] for i in training])
+    for question in (REGION, METHOD):
+        variant, sd = chosen[question.predicate]
+        answers = models.predicted(read_knowledge(variant), sd, *halves, (question,))
+        found[question.predicate, OURS] = answers[question.predicate]
+    return test, found, {name: f"{variant}, sd {sd:g}" for name, (variant, sd) in chosen.items()}
+
+
+def _choose(training: list[Row], groups: Sequence[str]) -> dict[str, tuple[str, float]]:
+    """Of the grid, the least held-out log-loss for each question, by three inner folds."""
+    folds = grouped_folds(groups, [row.label(METHOD.predicate) for row in training], n=3)
+    losses: dict[str, list[float]] = {REGION.predicate: [], METHOD.predicate: []}
+    for variant, sd in GRID:
+        sums = dict.fromkeys(losses, 0.0)
+        for test in folds:
+            inside = set(test.tolist())
+            fit = [row for i, row in enumerate(training) if i not in inside]
+            held = [training[i] for i in test]
+            answers = models.predicted(read_knowledge(variant), sd, fit, held, (REGION, METHOD))
+            for question in (REGION, METHOD):
+                sums[question.predicate] += len(held) * log_loss(_truth(held, question), answers[question.predicate])
+        for name, value in sums.items():
+            losses[name].append(value)
+    return {name: GRID[int(np.argmin(values))] for name, values in losses.items()}
+
+
+def _truth(rows: Sequence[Row], question: Question) -> np.ndarray:  # type: ignore[type-arg]
+    return np.array([question.classes.index(row.label(question.predicate)) for row in rows])
+
+
+def _gathered(
+    scheme: str, question: Question, rows: Sequence[Row], groups: Sequence[str], parts: Sequence[_Part]
+) -> HeldOut:
+    found = {name: np.zeros((len(rows), len(question.classes))) for name in (*BASELINES, OURS)}
+    chosen: dict[str, int] = {}
+    for test, answers, choice in parts:
+        for name, probabilities in found.items():
+            probabilities[test] = answers[question.predicate, name]
+        chosen[choice[question.predicate]] = chosen.get(choice[question.predicate], 0) + 1
+    return HeldOut(scheme, question, _truth(rows, question), tuple(groups), found, chosen)
