@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
 from mlnlite.infer.answer import marginal
 from mlnlite.learn import metrics
+from mlnlite.learn.content import content
 from mlnlite.learn.metrics import Calibration, Predictions
 from mlnlite.model.evidence import Evidence, Facts
 from mlnlite.model.facts import closed
@@ -143,13 +144,17 @@ def predictions(
     model: Model, evidence: Evidence, targets: Sequence[str], closed_world: Iterable[str] | Literal["all"] = "all"
 ) -> dict[int, dict[str, Predictions]]:
     """What is predicted of each database that has labels, by its number and the predicate. Arguments as `evaluate`."""
-    others = set(evidence.predicates) - set(targets)
+    others = [name for name in evidence.predicates if name not in targets]
     evidence = closed(evidence, _closable(evidence, others) if closed_world == "all" else closed_world)
     explicit = {name for name in targets if not evidence.facts[name].truth.all()}
     found: dict[int, dict[str, Predictions]] = {}
+    answers: dict[tuple[bytes, ...], Mapping[str, float]] = {}
     for i in np.unique(np.concatenate([evidence.facts[name].database for name in targets])).tolist():
         one = one_database(evidence, i)
-        answer = marginal(model, _without(one, targets), targets)
+        same = content(one, others)
+        if same not in answers:
+            answers[same] = marginal(model, _without(one, targets), targets)
+        answer = answers[same]
         found[i] = {
             name: _predictions(one, name, answer, explicit=name in explicit)
             for name in targets

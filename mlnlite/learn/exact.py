@@ -20,8 +20,9 @@ from mlnlite.ground.network import Network
 from mlnlite.ground.tables import completed
 from mlnlite.infer.formula import formula_probabilities
 from mlnlite.infer.marginal import marginals_of
+from mlnlite.learn.content import content
 from mlnlite.learn.merge import Listed
-from mlnlite.learn.worlds import MOST_WORLDS, components, list_worlds, n_worlds, pairs
+from mlnlite.learn.worlds import MOST_WORLDS, Worlds, components, list_worlds, n_worlds, pairs
 from mlnlite.model.evidence import Evidence, Facts
 from mlnlite.model.facts import closed
 from mlnlite.model.formulas import All, Any, AtomRef, Expression, Not
@@ -88,21 +89,56 @@ def compiled(
     """
     found = Compiled([], [], [], 0.0, 0)
     constant, n_choices = 0.0, 0
+    known: dict[tuple[bytes, ...], _Database] = {}
+    networks: dict[tuple[bytes, ...], Network] = {}
     for i in range(databases.n_databases):
         data = one_database(databases, i)
-        data = closed(data, [n for n in _closable(data) if n not in targets | unknown])
-        network = ground(model, conditions(databases, i, targets, unknown), engine=engine)
-        values = _values(network, data, targets - unknown)
-        parts = pairs(network) if objective == "composite" else components(network)
-        if all(n_worlds(network, p) <= MOST_WORLDS for p in parts):
-            worlds = list_worlds(network, values, parts, i)
-            found.every.append(worlds.every)
-            found.known.append(worlds.known)
-        else:
-            found.wide.append(Wide(network, _clamped(model, data, network, values, targets - unknown), i))
-        n, log_likelihood = _untouched(network, values, data, (targets, unknown))
-        constant, n_choices = constant + log_likelihood, n_choices + n
+        data = closed(data, _closable(data) - targets - unknown)
+        same = content(data, [n for n in data.predicates if n not in targets])
+        if same not in networks:
+            networks[same] = ground(model, conditions(databases, i, targets, unknown), engine=engine)
+        key = content(data, data.predicates)
+        if key not in known:
+            known[key] = _database(model, data, networks[same], (targets, unknown), objective)
+        one = known[key]
+        if one.worlds is not None:
+            found.every.append(_of_database(one.worlds.every, i))
+            found.known.append(_of_database(one.worlds.known, i))
+        if one.wide is not None:
+            found.wide.append(replace(one.wide, database=i))
+        constant, n_choices = constant + one.constant, n_choices + one.n_choices
     return replace(found, constant=constant, n_choices=n_choices)
+
+
+@dataclass(frozen=True, slots=True)
+class _Database:
+    """What one database adds: worlds, or a pair of networks."""
+
+    worlds: Worlds | None
+    wide: Wide | None
+    constant: float
+    n_choices: int
+
+
+def _database(
+    model: Model,
+    data: Evidence,
+    network: Network,
+    names: tuple[frozenset[str], frozenset[str]],
+    objective: Objective,
+) -> _Database:
+    targets, unknown = names
+    values = _values(network, data, targets - unknown)
+    n_choices, constant = _untouched(network, values, data, names)
+    parts = pairs(network) if objective == "composite" else components(network)
+    if all(n_worlds(network, p) <= MOST_WORLDS for p in parts):
+        return _Database(list_worlds(network, values, parts, 0), None, constant, n_choices)
+    wide = Wide(network, _clamped(model, data, network, values, targets - unknown), 0)
+    return _Database(None, wide, constant, n_choices)
+
+
+def _of_database(found: Listed, index: int) -> Listed:
+    return replace(found, database=np.full(len(found.database), index))
 
 
 def conditions(databases: Evidence, index: int, targets: frozenset[str], unknown: frozenset[str]) -> Evidence:
