@@ -121,9 +121,9 @@ def _mixed(model: Model, program: tree.Program) -> Iterator[Diagnostic]:
 
 
 def _mixes(formula: tree.Formula) -> bool:
-    inner = {tree.And: tree.Or, tree.Or: tree.And}.get(type(formula))
+    inner = tree.Or if isinstance(formula, tree.And) else tree.And if isinstance(formula, tree.Or) else ()
     for part in parts(formula):
-        if inner and isinstance(part, inner) and part.span and not _in_parentheses(part.span):
+        if isinstance(part, inner) and part.span and not _in_parentheses(part.span):
             return True
         if _mixes(part):
             return True

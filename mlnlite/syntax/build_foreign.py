@@ -24,7 +24,17 @@ def _term(place: Place, span: Span, children: Children) -> tree.Variable | tree.
     number = token[0].isdigit() or token[0] == "-"
     if number or not (place.language == "rockit" or is_variable(token)):
         return tree.Constant(str(token), span)
-    return tree.Variable(str(token).replace("-", "_"), plus, span)
+    return tree.Variable(variable_name(token), plus, span)
+
+
+def variable_name(word: str) -> str:
+    """The name of a variable in our dialect: it starts in lower case and has no hyphens.
+
+    >>> variable_name("x"), variable_name("X"), variable_name("first-name")
+    ('x', 'v_X', "first'name")
+    """
+    name = str(word).replace("-", "'")
+    return name if is_variable(name) else f"v_{name}"
 
 
 def _successor(place: Place, span: Span, children: Children) -> tree.Operation:
@@ -80,7 +90,11 @@ def _quantified(place: Place, span: Span, children: Children) -> tree.Quantified
 
 
 def _variables(place: Place, span: Span, children: Children) -> tuple[str, ...]:
-    return tuple(str(word).replace("-", "_") for word in children if word != ",")
+    return tuple(variable_name(word) for word in children if word != ",")
+
+
+def _number_of(place: Place, span: Span, children: Children) -> Weight:
+    return Weight(tree.NumberOf(variable_name(children[0]), span), True, span)
 
 
 def _guard(place: Place, span: Span, children: Children) -> Any:  # noqa: ANN401
@@ -116,5 +130,6 @@ FOREIGN_BUILDERS: dict[str, Callable[[Place, Span, Children], Any]] = {
     "rule": _rule,
     "weight": _foreign_weight,
     "function": _function,
+    "number_of": _number_of,
     "statement": statement,
 }

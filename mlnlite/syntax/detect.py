@@ -20,7 +20,11 @@ _SIGNS: tuple[tuple[tree.AnyDialect, re.Pattern[str], str], ...] = tuple(
         ("tuffy", r"^[ \t]*FD[ \t]*:", "a functional dependency"),
         ("tuffy", r"\[[^\]\n]*(?:<>|=|<|>)[^\]\n]*\]", "a condition in brackets"),
         ("tuffy", r"^[^\n]*:-[^\n]*\)[ \t]*,", "a rule with commas (`h :- a, b`)"),
-        ("tuffy", r"^[^\n:]*\)[ \t]*,[^\n]*=>", "a body with commas (`a, b => h`)"),
+        (
+            "tuffy",
+            r"^[ \t]*(?:@?-?[\d.]+[ \t]+)?!?[^\W\d]\w*\([^()\n]*\)[ \t]*,[^\n]*=>",
+            "a body with commas (`a, b => h`)",
+        ),
         ("lomrf", r":-", "a rule (`h :- b`)"),
         ("lomrf", r"\w\+\+", "a successor (`t++`)"),
         (

@@ -9,6 +9,7 @@ from typing import Any
 
 from mlnlite.errors import SyntaxMistake
 from mlnlite.syntax import tree
+from mlnlite.syntax.build_foreign import variable_name
 from mlnlite.syntax.grammar import parse_node
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
@@ -92,7 +93,7 @@ def _count(match: re.Match[str], place: Place, dialect: tree.Foreign) -> tree.Fo
     """RockIt's `|x| f >= 2`: for each binding of the other variables, a hard bound."""
     inside = replace(place, offset=place.offset + match.start(2))
     body = parse_node("formula", match[2].rstrip(), inside, dialect)
-    variables = tuple(name.strip() for name in match[1].split(","))
+    variables = tuple(variable_name(name.strip()) for name in match[1].split(","))
     span = place.span(0, len(match[0]))
     formula = tree.Count(variables, body, match[3], int(match[4]), span)
     return tree.FormulaStatement(formula, None, True, span=span)
