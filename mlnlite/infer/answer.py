@@ -227,8 +227,7 @@ def lifted_marginals(
             raise
         return None
     probability, log_z = lifted_probabilities(classes, known, question.atoms)
-    n = len(probability)
-    seconds = {"infer": perf_counter() - start}
+    n, seconds = len(probability), {"infer": perf_counter() - start}
     return Marginals(
         names=tuple(_texts(known, question.atoms)),
         probabilities=probability,

@@ -106,7 +106,8 @@ def _is_plain(expression: Expression) -> bool:
 def _weighted(templates: list[Template], type_name: str, unary: tuple[str, ...], binary: tuple[str, ...]) -> Fragment:
     """Works out all weights."""
     cells = np.array(list(product((False, True), repeat=len(unary) + len(binary))), np.bool_)
-    shared = np.array(list(product((False, True), repeat=2 * len(binary))), np.bool_).reshape(-1, len(binary), 2)
+    shared = np.array(list(product((False, True), repeat=2 * len(binary))), np.bool_)
+    shared = shared.reshape(len(shared), len(binary), 2)
     column = {name: i for i, name in enumerate((*unary, *binary))}
 
     def alone(name: str, _: tuple[int, ...]) -> Bool:
@@ -130,7 +131,7 @@ def _weighted(templates: list[Template], type_name: str, unary: tuple[str, ...],
 
 def _gain(weight: float, truth: Bool) -> Float:
     """Log-weight of a grounding."""
-    return np.where(truth, 0.0, -np.inf) if np.isposinf(weight) else weight * truth
+    return np.where(truth, 0.0, -np.inf) if np.isposinf(weight) else np.where(truth, weight, 0.0)
 
 
 def _truth(formula: Formula, expression: Expression, binding: dict[int, int], value: Value) -> Bool:
@@ -174,6 +175,6 @@ def groups_of(fragment: Fragment) -> tuple[Int64, Float]:
     peak = np.where(np.isneginf(peak), 0.0, peak)
     with np.errstate(divide="ignore"):
         both = peak + np.log(np.exp(fragment.pair - peak[:, :, None]).sum(axis=2))
-    keys = np.round(np.where(np.isneginf(both), -1e300, both), 10)
+    keys = np.where(np.isneginf(both), -np.inf, np.round(np.where(np.isneginf(both), 0.0, both), 10))
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return group.ravel().astype(np.int64), both[np.ix_(first, first)]

@@ -96,7 +96,7 @@ def log_sum(classes: Classes, apart: Sequence[tuple[int, int]] = ()) -> float:
         ways = _convolved(ways, _ways(n_more, own))
     counts = _counts(ways, int(size.sum()))
     fixed = np.zeros(len(classes.pair))
-    for c, g in apart:
+    for _, g in apart:
         fixed[g] += 1
     n = counts + fixed
     pair = np.where(np.isneginf(classes.pair), _NEVER, classes.pair)
@@ -107,7 +107,7 @@ def log_sum(classes: Classes, apart: Sequence[tuple[int, int]] = ()) -> float:
 def _ways(n: int, own: Float) -> Float:
     """Log-weight of each way to spread n constants over groups, by the numbers in all groups but the last."""
     shape = (n + 1,) * (len(own) - 1)
-    index = np.indices(shape).reshape(len(shape), -1)
+    index = np.indices(shape).reshape(len(shape), (n + 1) ** len(shape))
     last = n - index.sum(axis=0)
     ways = np.full(last.shape, -np.inf)
     counts = np.vstack([index, last])[:, last >= 0]

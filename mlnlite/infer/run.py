@@ -27,7 +27,7 @@ Ending = Literal["precise", "time", "interrupted"]
 
 LEAST_SIZE = 400.0
 MOST_R_HAT = 1.01
-_FIRST_LOOK, _LATER = 64, 1.6
+_FIRST_LOOK, _LATER = 256, 1.5
 _AT_ONCE, _FEWEST = 0.2, 8
 
 
@@ -192,21 +192,26 @@ def look(run: Run, precision: float = np.inf) -> Look:
 def until_precise(run: Run, precision: float, deadline: Deadline) -> tuple[Look, Ending]:
     """Lets the chains go on until all columns are precise, effective sizes large and chains at one, or time is up.
 
+    Twice in a row, because the first time may be luck. When to look depends on the number of draws alone, so that a
+    seed gives the same answer each time unless time is up.
+
     Args:
         run: chains.
         precision: largest standard error.
         deadline: when to stop anyway.
     """
-    n, due = 1, _FIRST_LOOK
+    n, due, was_enough = 1, _FIRST_LOOK, False
     while run.traces.n < _FEWEST or not deadline.is_over:
         begin = perf_counter()
         make_room(run.traces)
-        n = min(n, run.traces.means.shape[1] - run.traces.n)
+        traces = run.traces
+        n = min(n, traces.means.shape[1] - traces.n, max(1, (due - traces.n_draws) // traces.batch))
         advance(run, n)
         n = max(1, min(32, int(n * _AT_ONCE / (perf_counter() - begin))))
         if run.traces.n_draws >= due:
-            found = look(run, precision)
-            if is_enough(found, precision):
+            found, before = look(run, precision), was_enough
+            was_enough = is_enough(found, precision)
+            if was_enough and before:
                 return found, "precise"
             due = int(due * _LATER)
     return look(run), "interrupted" if deadline.stop.is_set() else "time"

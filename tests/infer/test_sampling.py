@@ -1,0 +1,225 @@
+"""Samplers against exact answers: their errors are as large as they say, and their kernels do what is written."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import mlnlite as ml
+from mlnlite.ground.patterns import with_counts
+from mlnlite.infer.factors import factors_of
+from mlnlite.infer.gibbs import gibbs_draws, log_weights, owners, start, states
+from mlnlite.infer.marginal import marginals_of
+from mlnlite.infer.mcsat import jump
+from mlnlite.infer.sampling import Effort, sample
+from tests.networks import network, networks, world_weight, worlds
+
+NOTHING = np.zeros((0, 2), np.int32)
+
+
+def everything(net):
+    return np.ones(net.n_variables, bool), (np.arange(net.n_atoms), ())
+
+
+def smokers(n, n_friends, seed=0):
+    """Smoking spreads along pairs of friends and causes cancer."""
+    rng = np.random.default_rng(seed)
+    pairs = {tuple(sorted(p)) for p in rng.integers(0, n, (n_friends, 2)).tolist() if p[0] != p[1]}
+    both = [([-a - 1, b + 1], 0, 1) for a, b in pairs] + [([a + 1, -b - 1], 0, 1) for a, b in pairs]
+    own = [([-a - 1, a + n + 1], 1, 1) for a in range(n)]
+    alone = [([a + 1], 2, 1) for a in range(n)]
+    return network([("", 1)] * (2 * n), [(both + own, False), (alone, False)], weights=[1.0, 1.1, -0.4])
+
+
+def nearly_hard(n=40, weight=7.0):
+    """Chains of four atoms, nearly hard, their ends pulled apart."""
+    links = [([-a - 1, a + 2], 0, 1) for a in range(4 * n) if a % 4 != 3]
+    links += [([a + 1, -a - 2], 0, 1) for a in range(4 * n) if a % 4 != 3]
+    pulls = [([a + 1], 1 + a % 3, 1) for a in range(4 * n) if a % 4 in (0, 3)]
+    return network([("", 1)] * (4 * n), [(links, False), (pulls, False)], weights=[weight, 0.6, -0.5, 0.3])
+
+
+def one_hot(n=60, size=4):
+    """Blocks whose neighbours like to agree."""
+    same = [
+        ([-(v * size + k) - 1, (v + 1) * size + k + 1], 0, 1) for v in range(n - 1) for k in range(size) if v % 6 != 5
+    ]
+    words = [([v * size + (v * v) % size + 1], 1, 1) for v in range(n)]
+    return network([("!", size)] * n, [(same, False), (words, False)], weights=[1.5, 0.8])
+
+
+def two_modes(n=24):
+    """Triples whose atoms are all true or all false, by a hard formula, so that no single flip is possible."""
+    rows = [[3 * i + j for j in range(3)] for i in range(n)]
+    truth = np.zeros((2, 2, 2), bool)
+    truth[0, 0, 0] = truth[1, 1, 1] = True
+    pulls = [([3 * i + 1], 1 + i % 4, 1) for i in range(n)]
+    pairs = [([-3 * i - 1, 3 * i + 4], 5, 1) for i in range(n - 1) if i % 3 != 2]
+    return network(
+        [("", 1)] * (3 * n), [(pulls, False), (pairs, False)], [(truth, [(r, 0, 1) for r in rows])],
+        weights=[np.inf, 0.4, -1.2, 2.0, 0.0, 1.0],
+    )  # fmt: skip
+
+
+CASES = {
+    "smokers": (lambda: smokers(150, 160), ("gibbs", "mcsat", "tempering")),
+    "nearly hard": (nearly_hard, ("mcsat",)),
+    "one hot": (one_hot, ("gibbs", "mcsat")),
+    "two modes": (two_modes, ("mcsat",)),
+}
+
+
+@pytest.mark.parametrize(("name", "sampler"), [(n, s) for n, (_, samplers) in CASES.items() for s in samplers])
+def test_errors_are_as_large_as_they_say(name, sampler):
+    net = CASES[name][0]()
+    exact = marginals_of(net).probability
+    scores = []
+    for seed in (1, 2):
+        found = sample(net, *everything(net), sampler, Effort(0.01, 30.0, seed=seed))
+        assert found.ending == "precise"
+        sure = found.exact | (found.error == 0)
+        assert np.abs(found.probability - exact)[sure].max(initial=0) < 1e-6
+        scores.append(((found.probability - exact) / np.where(sure, 1, found.error))[~sure])
+    score = np.concatenate(scores)
+    assert np.abs(score).max() < 5
+    assert 0.92 <= np.mean(np.abs(score) < 1.96) <= 0.985
+    assert 0.85 < score.std() < 1.2
+
+
+def test_gibbs_alone_does_not_cross_between_modes():
+    net = two_modes()
+    found = sample(net, *everything(net), "gibbs", Effort(0.008, 1.0))
+    assert found.ending == "time"
+    assert not found.mixed.all()
+
+
+@pytest.mark.parametrize(
+    ("text", "facts", "expected"),
+    [
+        ("H\nS\nH v S.\n", "", {"H": 2 / 3, "S": 2 / 3}),
+        ("A\nB\n1.5 A <=> B\n", "", {"A": 0.5, "B": 0.5, "A <=> B": np.exp(1.5) / (1 + np.exp(1.5))}),
+        ("A\nB\n1.5 A <=> B\n0.7 A\n", "", {"A": None, "B": None, "A <=> B": None}),
+    ],
+)
+@pytest.mark.parametrize("method", ["auto", "mcsat"])
+def test_known_traps(text, facts, expected, method):
+    model = ml.model_from_text(text)
+    evidence = ml.evidence_from_text(facts, model=model)
+    exact = ml.marginal(model, evidence, list(expected), method="exact")
+    found = ml.marginal(model, evidence, list(expected), method=method, precision=0.004, time_limit=20)
+    for name, p in expected.items():
+        assert exact[name] == pytest.approx(exact[name] if p is None else p, abs=1e-12)
+        assert found[name] == pytest.approx(exact[name], abs=0.01 if method == "mcsat" else 1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(networks())
+def test_state_of_a_world_is_its_weight(net):
+    every = worlds(net)
+    weights = np.array([world_weight(net, w) for w in every])
+    factors = factors_of(with_counts(net), np.ones(net.n_variables, bool))
+    if not factors.n_factors:
+        return
+    rng = np.random.default_rng(0)
+    sums = np.array([log_weights(start(factors, w[factors.atom], rng)).sum() for w in every])
+    possible = np.isfinite(weights)
+    assert np.array_equal(sums > -1e7, possible) or not possible.any()
+    if possible.any():
+        difference = (sums - weights)[possible]
+        assert np.ptp(difference) < 1e-9
+
+
+def test_sweep_equals_its_twin():
+    net = one_hot(12)
+    factors = factors_of(net, np.ones(net.n_variables, bool))
+    truth = worlds_at_random(net, 1)[0][factors.atom]
+    fast, slow = (start(factors, truth, np.random.default_rng(5)) for _ in range(2))
+    sums = gibbs_draws(fast, 20, NOTHING)
+    total = twin(slow, np.random.default_rng(5).random((20, factors.n_variables)))
+    assert np.array_equal(fast.true, slow.true)
+    assert np.array_equal(fast.state, states(factors, fast.true))
+    assert np.allclose(sums.total, total)
+
+
+def twin(chain, uniform):
+    """The Gibbs kernel, in words of NumPy: every value of every variable by weighing the whole world."""
+    f, total = chain.factors, np.zeros((2, chain.factors.n_atoms))
+    for row in uniform:
+        for v, u in enumerate(row):
+            atoms = list(range(f.first[v], f.first[v + 1]))
+            choices = [*atoms, *([-1] if f.none[v] else [])]
+            worth = []
+            for a in choices:
+                chain.true[v] = a
+                worth.append(f.value[f.row + states(f, chain.true)].sum())
+            p = np.exp(np.array(worth) - max(worth))
+            p /= p.sum()
+            total[0, atoms] += p[: len(atoms)]
+            total[1, atoms] += p[: len(atoms)] ** 2
+            chain.true[v] = choices[int(np.searchsorted(p.cumsum(), u, side="right"))]
+    return total
+
+
+def worlds_at_random(net, n):
+    rng = np.random.default_rng(0)
+    values = (rng.random((n, net.n_variables)) * net.cardinality).astype(int)
+    return values[:, net.variable] == net.value
+
+
+def test_a_hard_slice_is_drawn_uniformly():
+    net = network(
+        [("", 1)] * 3 + [("!", 3)], [([([1, 2], 0, 1), ([-2, 4], 0, 1), ([-3, -5], 0, 1)], False)], weights=[np.inf]
+    )
+    possible = [tuple(w) for w in worlds(net) if world_weight(net, w) == 0.0]
+    factors = factors_of(net, np.ones(net.n_variables, bool))
+    chain = start(factors, np.array(possible[0])[factors.atom], np.random.default_rng(3))
+    even, seen = np.ones(net.n_variables, bool), dict.fromkeys(possible, 0)
+    for _ in range(4000):
+        jump(chain, even)
+        truth = np.zeros(net.n_atoms, bool)
+        truth[factors.atom[chain.true[chain.true >= 0]]] = True
+        seen[tuple(truth)] += 1
+    expected = 4000 / len(possible)
+    assert sum((n - expected) ** 2 / expected for n in seen.values()) < 2.5 * len(possible)
+    assert even.all()
+
+
+def test_a_large_slice_says_that_it_was_walked():
+    n = 60
+    rng = np.random.default_rng(1)
+    rows = [(sorted(int(x) for x in rng.choice(np.arange(1, n + 1), 3, replace=False)), 0, 1) for _ in range(90)]
+    net = network([("", 1)] * n, [(rows, False)], weights=[np.inf])
+    found = sample(net, *everything(net), "mcsat", Effort(0.02, 10.0))
+    assert "MC-SAT, partly Metropolis" in found.methods
+
+
+def test_atoms_of_a_factor_know_their_variable():
+    net = one_hot(3)
+    factors = factors_of(net, np.ones(net.n_variables, bool))
+    assert owners(factors).tolist() == net.variable[factors.atom].tolist()
+
+
+def test_forced_atoms_are_exact():
+    net = network(
+        [("", 1)] * 3, [([([1, 2], 0, 1), ([1, -2], 0, 1)], False), ([([3], 1, 1)], False)], weights=[np.inf, 0.5]
+    )
+    found = sample(net, *everything(net), "mcsat", Effort(0.01, 10.0))
+    assert found.exact.tolist() == [True, False, False]
+    assert found.methods[0] == "forced by hard formulas"
+    assert found.probability[0] == 1.0
+
+
+def test_rare_atoms_have_an_interval():
+    net = network([("", 1)] * 2, [([([1, 2], 0, 1)], False), ([([1], 1, 1)], False)], weights=[0.3, -30.0])
+    found = sample(net, *everything(net), "gibbs", Effort(0.01, 10.0))
+    assert not found.exact.any()
+    assert found.methods[0].endswith("never seen otherwise")
+    assert found.low[0] == 0.0
+    assert 0 < found.high[0] < 0.05
+
+
+def test_same_seed_same_answer():
+    net = smokers(20, 25)
+    first, second = (sample(net, *everything(net), "gibbs", Effort(0.02, 10.0, seed=4)) for _ in range(2))
+    n = min(first.draws.shape[1], second.draws.shape[1], 20)
+    assert n >= 8
+    assert first.probability == pytest.approx(second.probability, abs=0.1)
