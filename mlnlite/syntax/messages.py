@@ -61,7 +61,6 @@ MESSAGES: dict[str, str] = {
     "E151": "`...` stands between two whole numbers, rising, at most {limit:,} apart",
     "E152": "the formula stands for more than {limit} formulas",
     "E153": "the macro `{found}` is not defined above",
-    "E154": "{problem}",
     "E199": "more than {limit} mistakes; the rest of the file was not read",
 }
 
