@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +16,11 @@ from mlnlite.ground.ground import ground
 from mlnlite.ground.groups import renamed
 from mlnlite.ground.network import Network
 from mlnlite.infer.approach import Approach, MarginalMethod
-from mlnlite.infer.cells import fragment_of
+from mlnlite.infer.cells import LIFTED, WORTH_LIFTING, fragment_of, n_lifted_atoms
 from mlnlite.infer.ladder import solve
-from mlnlite.infer.lifted import LIFTED, WORTH_LIFTING, classes_of, lifted_probabilities, n_lifted_atoms
-from mlnlite.infer.map import map_of
 from mlnlite.infer.marginal import WIDTH_LIMIT
 from mlnlite.infer.marginals import EVIDENCE, marginals_from
 from mlnlite.infer.query import Question, atom_numbers, question_of
-from mlnlite.infer.rungs import Method
 from mlnlite.infer.score import costs, counts
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
@@ -31,6 +29,9 @@ from mlnlite.model.model import Model
 from mlnlite.model.propositional import Proposition, simplified
 from mlnlite.model.unparse import row_text
 from mlnlite.results import MapState, Marginals, Statistics, Violation
+
+if TYPE_CHECKING:
+    from mlnlite.infer.rungs import Method
 
 Int64 = NDArray[np.int64]
 
@@ -60,8 +61,8 @@ def marginal(  # noqa: PLR0913
             formula leaves open.
         closed_world: predicates of which everything that is not a fact is false; "all" for all that the query does
             not mention (but functional predicates `!` without a known value stay open).
-        method: "auto" (exact where it fits, else sampled), "exact" (or refuse), "lifted", "wmc", or "gibbs", "mcsat",
-            "tempering", "bp" for everything.
+        method: "auto" (exact where it fits, else sampled), "exact" (or refuse), "lifted", or "gibbs", "mcsat" or
+            "tempering" for everything.
         width_limit: largest number of entries of a table in exact inference.
         precision: largest standard error of what is sampled; sampling stops when it is reached.
         time_limit: [s] for sampling, 60 by default; the result then says what is not as precise as asked.
@@ -73,7 +74,6 @@ def marginal(  # noqa: PLR0913
         QueryMistake: if the query, or a closed world, does not fit the model.
         Contradiction: if no world satisfies the evidence and the hard formulas.
         LimitReached: if an exact answer was asked for and would need more than the limit.
-        MissingPart: if the method needs something that is not installed.
     """
     approach = Approach(method, width_limit, precision, time_limit, chains, seed)
     if method in ("auto", "lifted") and query is not None:
@@ -162,6 +162,8 @@ def map_state_for(
     if question.formulas:
         hint = "ask for atoms or predicates; the probability of a formula is a question for `marginal`"
         raise QueryMistake(f"the most probable world has atoms, not formulas: {question.formulas[0].text}", hint)
+    from mlnlite.infer.map import map_of
+
     start = perf_counter()
     best = map_of(network, method=method, time_limit=time_limit, seed=seed, gap=gap)
     index, truth = _locate(network, question.atoms)
@@ -220,6 +222,8 @@ def lifted_marginals(
         if must:
             raise QueryMistake("lifted inference answers atoms of predicates that formulas mention, nothing else")
         return None
+    from mlnlite.infer.lifted import classes_of, lifted_probabilities
+
     try:
         classes = classes_of(fragment, known)
     except LimitReached:

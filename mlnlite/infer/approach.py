@@ -8,7 +8,7 @@ from typing import Literal
 from mlnlite.infer.marginal import WIDTH_LIMIT
 
 Sampler = Literal["gibbs", "mcsat", "tempering"]
-MarginalMethod = Literal["auto", "exact", "lifted", "wmc", "gibbs", "mcsat", "tempering", "bp"]
+MarginalMethod = Literal["auto", "exact", "lifted", "gibbs", "mcsat", "tempering"]
 SAMPLERS: dict[MarginalMethod, Sampler] = {"gibbs": "gibbs", "mcsat": "mcsat", "tempering": "tempering"}
 PATIENCE = 60.0
 

@@ -21,6 +21,9 @@ from mlnlite.model.model import Model
 from mlnlite.model.templates import Template
 
 MOST_CELLS, MOST_PAIRS = 10, 6
+WORTH_LIFTING = 400
+"""Atoms from which on it is worth more than grounding."""
+LIFTED = "lifted"
 Value = Callable[[str, tuple[int, ...]], Bool]
 
 
@@ -72,6 +75,12 @@ def fragment_of(model: Model, evidence: Evidence) -> Fragment | str:
     if len(unary) + len(binary) > MOST_CELLS or 2 * len(binary) > MOST_PAIRS:
         return "it has too many predicates"
     return _weighted(templates, types[0], unary, binary)
+
+
+def n_lifted_atoms(fragment: Fragment, evidence: Evidence) -> int:
+    """How many ground atoms the predicates of a fragment have."""
+    n = int(evidence.present[fragment.type][0].sum())
+    return len(fragment.unary) * n + len(fragment.binary) * n**2
 
 
 def _why_not(template: Template) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from mlnlite.ground.network import Int32, Int64, Network
+
+
+_FEW = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +41,32 @@ def labels_of(n_variables: int, scopes: Iterable[Int32]) -> Int32:
     linked = [s for s in scopes if s.shape[1] > 1]
     start = np.concatenate([np.repeat(s[:, 0], s.shape[1] - 1) for s in linked] or [np.zeros(0, np.int32)])
     end = np.concatenate([s[:, 1:].ravel() for s in linked] or [np.zeros(0, np.int32)])
-    graph = coo_matrix((np.ones(len(start), np.int8), (start, end)), shape=(n_variables, n_variables))
-    _, labels = connected_components(graph, directed=False)
+    labels = _few(n_variables, start, end) if len(start) <= _FEW else _many(n_variables, start, end)
     _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[inverse].astype(np.int32)
+
+
+def _few(n_variables: int, start: Int32, end: Int32) -> Int32:
+    """Some number for each component, link by link; saves the time to load SciPy's graphs."""
+    parent = list(range(n_variables))
+
+    def root(v: int) -> int:
+        while parent[v] != v:
+            parent[v] = v = parent[parent[v]]
+        return v
+
+    for a, b in zip(start.tolist(), end.tolist(), strict=True):
+        parent[root(a)] = root(b)
+    return np.array([root(v) for v in range(n_variables)], np.int32)
+
+
+def _many(n_variables: int, start: Int32, end: Int32) -> Int32:
+    """Some number for each component, by SciPy."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_matrix((np.ones(len(start), np.int8), (start, end)), shape=(n_variables, n_variables))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int32)
 
 
 def rows_by_label(labels: Int32, n_labels: int) -> tuple[Int64, Int64]:

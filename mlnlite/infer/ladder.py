@@ -72,7 +72,6 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
         Contradiction: no world satisfies the hard formulas.
         LimitReached: an exact answer was asked for and is too wide.
         QueryMistake: a weight is not known.
-        MissingPart: the method needs something that is not installed.
     """
     asked = np.union1d(atoms, np.array(sorted({n for f in formulas for n in atom_numbers(f)}), np.int64)).astype(
         np.int64

@@ -19,9 +19,6 @@ from mlnlite.infer.cells import Fragment, groups_of
 from mlnlite.model.evidence import Evidence
 
 MOST_TERMS = 20_000_000
-WORTH_LIFTING = 400
-"""Atoms from which on it is worth more than grounding."""
-LIFTED = "lifted"
 _NEVER = -1e30
 
 
@@ -46,12 +43,6 @@ class Classes:
     group: Int64
     own: Float
     pair: Float
-
-
-def n_lifted_atoms(fragment: Fragment, evidence: Evidence) -> int:
-    """How many ground atoms the predicates of a fragment have."""
-    n = int(evidence.present[fragment.type][0].sum())
-    return len(fragment.unary) * n + len(fragment.binary) * n**2
 
 
 def classes_of(fragment: Fragment, evidence: Evidence) -> Classes:

@@ -61,8 +61,6 @@ def status_of(names: Sequence[str], source: Int64, solution: Solution) -> str:
     used = source[source >= 0]
     if solution.exact[used].all():
         return "exact"
-    if "approximate" in solution.endings:
-        return "approximate: loopy belief propagation, with no bound on its error"
     error = float(np.nanmax(solution.error[used]))
     parts = [f"sampled, standard errors up to {error:.4f}"]
     parts += [word for end, word in _ENDINGS.items() if end in solution.endings]

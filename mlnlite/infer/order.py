@@ -10,8 +10,6 @@ from math import log2, prod
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from mlnlite.ground.network import Int32, Int64
 
@@ -74,6 +72,9 @@ def _neighbours(n: int, edges: tuple[Int64, Int64]) -> list[set[int]]:
 
 def _sweep(n: int, edges: tuple[Int64, Int64]) -> list[int]:
     """Place of each variable in a sweep from one end of the graph to the other (Cuthill and McKee 1969)."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
     graph = csr_matrix((np.ones(len(edges[0]), np.int8), edges), shape=(n, n))
     place = np.empty(n, np.int64)
     place[reverse_cuthill_mckee(graph + graph.T, symmetric_mode=True)] = np.arange(n)
