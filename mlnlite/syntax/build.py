@@ -113,7 +113,9 @@ def _equality(place: Place, span: Span, children: Children) -> tree.Formula:
 
 def _operation(place: Place, span: Span, children: Children) -> tree.Operation:
     left, operator, right = children
-    return tree.Operation(str(operator), left, right, span)
+    operation = tree.Operation(str(operator), left, right, span)
+    refuse_long_expression(operation)
+    return operation
 
 
 def _both(place: Place, span: Span, children: Children) -> raw.Both:

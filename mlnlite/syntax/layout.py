@@ -16,6 +16,8 @@ _TOKEN = re.compile(
     re.DOTALL,
 )
 _AROUND = {"<=>", "=>", ":-", "=/=", "!=", "<>", "<=", ">=", ":=", "+-", "=", "<", ">", "^", "v", "|"}
+LONGEST_WEIGHT = 80
+"""Words and blanks of a weight that are kept as they are; no one writes longer ones."""
 _OPENING = {"(", "[", "!", "*"}
 
 
@@ -87,7 +89,7 @@ def _styled(line: str) -> str:
         token = match[0]
         blank = line[match.start() - 1 : match.start()].isspace() if match.start() else False
         if words:
-            in_weight = in_weight and not blank and _is_weight("".join(words))
+            in_weight = in_weight and not blank and len(words) < LONGEST_WEIGHT and _is_weight("".join(words))
             words.append("" if in_weight and not token.startswith("//") else _space(words[-1], token, had_blank=blank))
         words.append(token)
     return "".join(words)

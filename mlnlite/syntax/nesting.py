@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import TypeAlias
 
 from mlnlite.errors import SyntaxMistake
 from mlnlite.syntax import raw, tree
@@ -48,22 +49,39 @@ def _depths(text: str) -> Iterator[tuple[int, int]]:
         yield match.start(), level + negations
 
 
-def refuse_long_expression(weight: tree.WeightExpression) -> None:
-    """Passes a weight whose operations are nested at most `MAX_DEPTH` deep, sums and products included.
+def refuse_long_chain(text: str, place: Place) -> None:
+    """Passes a statement with at most `MAX_DEPTH` implications, which nest where a language chains them.
+
+    Raises:
+        SyntaxMistake: it has more.
+    """
+    if text.count("=>") > MAX_DEPTH:
+        raise SyntaxMistake([mistake("E116", place.span(0, len(text)), _HINT, limit=MAX_DEPTH)])
+
+
+def refuse_long_expression(weight: tree.WeightExpression | tree.Operation) -> None:
+    """Passes a weight, or arithmetic of terms, that is nested at most `MAX_DEPTH` deep, sums and products included.
 
     Raises:
         SyntaxMistake: it is deeper.
     """
-    level: list[tree.WeightExpression] = [weight]
+    level: list[_Node] = [weight]
     for _ in range(MAX_DEPTH):
         level = [part for node in level for part in _parts(node)]
         if not level:
             return
-    raise SyntaxMistake([mistake("E116", weight.span, "compute the weight beforehand", limit=MAX_DEPTH)])
+    raise SyntaxMistake([mistake("E116", weight.span, "compute it beforehand", limit=MAX_DEPTH)])
 
 
-def _parts(node: tree.WeightExpression | raw.Macro) -> tuple[tree.WeightExpression, ...]:
+_Node: TypeAlias = tree.WeightExpression | tree.TermExpression | raw.Macro | raw.Apply | tree.Hole
+
+
+def _parts(node: _Node) -> tuple[_Node, ...]:
     match node:
+        case tree.Operation():
+            return (node.left, node.right)
+        case tree.Variable() | tree.Constant() | tree.Hole() | raw.Apply():
+            return ()
         case raw.Macro():
             return ()
         case tree.Number() | tree.Size() | tree.NumberOf():

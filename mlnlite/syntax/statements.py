@@ -12,6 +12,7 @@ from mlnlite.syntax import tree
 from mlnlite.syntax.build_foreign import variable_name
 from mlnlite.syntax.grammar import parse_node
 from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.nesting import refuse_long_chain
 from mlnlite.syntax.place import Place
 
 _TYPE = re.compile(r"[^\W\d][\w'-]*\s*=\s*\{")
@@ -70,6 +71,7 @@ def read_foreign(
     Raises:
         SyntaxMistake: it is no statement of the language, or has no counterpart here.
     """
+    refuse_long_chain(text, place)
     for pattern, construct, hint in _REFUSED:
         if pattern.match(text):
             raise SyntaxMistake([mistake("E110", place.span(0, len(text)), hint, construct=construct)])
