@@ -33,6 +33,16 @@ def hessian(choices: Choices, x: Float) -> sparse.csr_array:
     return sparse.csr_array(second - mean.T @ sparse.diags_array(choices.many) @ mean)
 
 
+def columns(choices: Choices, x: Float, at: Int64) -> tuple[Float, Float]:
+    """The diagonal of minus the Hessian, shape (n_weights,), and its columns `at`, shape (n_weights, len(at))."""
+    point, mean = likelihood.at(choices, x), expected_rows(choices, x)
+    weight = choices.many[choices.choice] * point.chance
+    diagonal = choices.rows.power(2).T @ weight - mean.power(2).T @ choices.many
+    rows, means = (np.asarray(m[:, at].todense(), float) for m in (choices.rows, mean))
+    chosen = choices.rows.T @ (weight[:, None] * rows) - mean.T @ (choices.many[:, None] * means)
+    return np.asarray(diagonal), np.asarray(chosen)
+
+
 def scores(choices: Choices, x: Float) -> sparse.csr_array:
     """Gradient of each cluster, shape (n_clusters, n_weights); clusters without a choice are left out."""
     clusters, cluster = np.unique(choices.group, return_inverse=True)

@@ -214,23 +214,20 @@ def _fitted(problem: Problem, columns: Sequence[int], start: Float) -> Float:
 
 def _scores(found: Choices, x: Float, active: Sequence[int]) -> Float:
     """Score statistic of each column, the active ones being at their best."""
-    bend = np.asarray(information.hessian(found, x).todense(), float)
-    slope = np.asarray(found.many @ information.expected_rows(found, x))
     at = np.array(sorted(active), np.int64)
-    if len(at):
-        coupled = bend[:, at]
-        inverse = np.linalg.pinv(bend[np.ix_(at, at)] + PRECISION * np.eye(len(at)), hermitian=True)
-        left = bend.diagonal() - np.einsum("ij,jk,ik->i", coupled, inverse, coupled)
-    else:
-        left = bend.diagonal()
-    usable = left > 1e-6 * np.maximum(bend.diagonal(), 1.0)
+    slope = np.asarray(found.many @ information.expected_rows(found, x))
+    diagonal, coupled = information.columns(found, x, at)
+    inverse = np.linalg.pinv(coupled[at] + PRECISION * np.eye(len(at)), hermitian=True)
+    left = diagonal - np.einsum("ij,jk,ik->i", coupled, inverse, coupled)
+    usable = left > 1e-6 * np.maximum(diagonal, 1.0)
     return np.asarray(np.where(usable, slope**2 / np.where(usable, left, 1.0), 0.0))
 
 
 def _weak(found: Choices, x: Float, fixed: Sequence[int], chosen: dict[int, float], needed: float) -> set[int]:
     """Chosen columns whose Wald statistic is too small."""
     at = np.array(sorted([*fixed, *chosen]), np.int64)
-    bend = np.asarray(information.hessian(found, x).todense(), float)[np.ix_(at, at)]
+    part = replace(found, rows=sparse.csr_array(found.rows[:, at]))
+    bend = np.asarray(information.hessian(part, x[at]).todense(), float)
     variance = np.linalg.pinv(bend + PRECISION * np.eye(len(at)), hermitian=True).diagonal()
     wald = dict(zip(at.tolist(), (x[at] ** 2 / np.maximum(variance, 1e-300)).tolist(), strict=True))
     return {j for j in chosen if wald[j] < needed}
