@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
+from zipfile import BadZipFile, ZipFile
 
 from mlnlite.errors import Diagnostic, SyntaxMistake, did_you_mean
 from mlnlite.source import Source, Span
 from mlnlite.syntax.messages import mistake
 
 MAX_BYTES = 256 * 1024 * 1024
+_ARCHIVE = re.compile(r"(.+\.pracmln)(?::(.+))?", re.DOTALL)
 _BOM = b"\xef\xbb\xbf"
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
@@ -17,7 +20,8 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 def read_source(path: str | os.PathLike[str]) -> Source:
     """The text of a UTF-8 file, under the name that its path has here.
 
-    A byte-order mark at its start is dropped, and every kind of line end becomes a newline.
+    `project.pracmln` and `project.pracmln:name` are files of a pracmln project.
+    A byte-order mark at the start is dropped, and every kind of line end becomes a newline.
 
     Raises:
         SyntaxMistake: no such file, a folder, not readable, empty, too large, or not UTF-8 text.
@@ -32,7 +36,31 @@ def read_source(path: str | os.PathLike[str]) -> Source:
     return Source(name, _decoded(name, data).replace("\r\n", "\n").replace("\r", "\n"))
 
 
+def _member(name: str, archive: str, wanted: str) -> bytes:
+    """A file of a pracmln project, which is a zip: the one named after the colon, or its only model."""
+    try:
+        with ZipFile(archive) as project:
+            files = [info for info in project.infolist() if not info.is_dir()]
+            found = [f for f in files if f.filename == wanted or Path(f.filename).name == wanted]
+            if not wanted:
+                found = [f for f in files if f.filename.endswith(".mln")]
+            if len(found) != 1:
+                names = ", ".join(f.filename for f in files)
+                raise _refusal(mistake("E140", None, f"write `{archive}:NAME`; it holds {names}", path=name))
+            if found[0].file_size > MAX_BYTES:
+                sizes = {"size": found[0].file_size // 2**20, "limit": MAX_BYTES // 2**20}
+                raise _refusal(mistake("E135", None, "split it into several files", path=name, **sizes))
+            return project.read(found[0])
+    except FileNotFoundError:
+        raise _refusal(mistake("E130", None, similar_file(Path(archive)), path=archive)) from None
+    except (OSError, BadZipFile, RuntimeError, NotImplementedError) as error:
+        raise _refusal(mistake("E136", None, path=name, reason=str(error))) from None
+
+
 def _bytes(name: str) -> bytes:
+    archive = _ARCHIVE.fullmatch(name)
+    if archive:
+        return _member(name, archive[1], archive[2] or "")
     path = Path(name)
     try:
         if path.is_dir():

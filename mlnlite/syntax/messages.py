@@ -47,6 +47,7 @@ MESSAGES: dict[str, str] = {
     "E137": "the file to include, `{path}`, does not exist",
     "E138": "this file includes itself: {chain}",
     "E139": "files are included more than {limit} deep",
+    "E140": "`{path}` does not say which file of the project is meant",
     # evidence
     "E141": "a second fact on the same line, starting at {found}",
     "E142": "a formula where a fact was expected: found {found} after the fact",
