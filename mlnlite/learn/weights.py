@@ -58,8 +58,7 @@ def learn(
         engine: what runs the counting joins; by default chosen by size.
 
     Raises:
-        QueryMistake: if the arguments do not fit the model or each other.
-        ModelMistake: if there is nothing to learn.
+        QueryMistake, ModelMistake: if the arguments do not fit, or there is nothing to learn.
         Contradiction: if the data violate a hard formula.
         EvidenceMistake: if a block that must have a value has none.
         LimitReached: if the likelihood is too wide for elimination.
@@ -69,10 +68,11 @@ def learn(
     targets, unknown = _names(model, predict, "predict"), _names(model, frozenset(open_predicates), "leave open")
     _verify(objective, unknown)
     model = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
-    if objective == "pseudo-likelihood":
-        found = pseudo_problem(model, databases, targets, engine)
-    else:
-        found = _exact_problem(model, databases, targets, unknown, objective, engine)
+    found = (
+        pseudo_problem(model, databases, targets, engine)
+        if objective == "pseudo-likelihood"
+        else _exact_problem(model, databases, targets, unknown, objective, engine)
+    )
     counted = monotonic()
     solution = _solved(model, found, prior, deadline)
     seconds = {"count": counted - start, "solve": monotonic() - counted}
@@ -104,7 +104,8 @@ def _types(model: Model, databases: Evidence) -> dict[str, Type]:
 
 
 def _names(model: Model, given: Iterable[str] | None, what: str) -> frozenset[str]:
-    names = frozenset(model.predicates if given is None else given)
+    all_names = (n for n, p in model.predicates.items() if p.comparison is None)
+    names = frozenset(all_names if given is None else given)
     for name in sorted(names - set(model.predicates)):
         hint = did_you_mean(name, list(model.predicates))
         raise QueryMistake([Diagnostic("E510", f"there is no predicate {name} to {what}", hint=hint)])
