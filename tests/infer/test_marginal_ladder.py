@@ -1,0 +1,78 @@
+"""What is too wide is sampled, and the result says so."""
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import mlnlite as ml
+
+TEXT = """Smokes(p)
+Friends(p, p)
+Cancer(p)
+1.5 Smokes(x) => Cancer(x)
+1.1 Friends(x, y) => (Smokes(x) <=> Smokes(y))
+-0.5 Smokes(x)
+-2 Friends(x, y)
+"""
+QUERY = ["Smokes", "Cancer(P0)", "Smokes(P0) ^ Smokes(P1)"]
+
+
+@pytest.fixture(scope="module")
+def asked():
+    model = ml.model_from_text(TEXT)
+    facts = "\n".join(f"Cancer(P{i})" for i in range(5))
+    return model, ml.evidence_from_text(facts, model=model)
+
+
+@pytest.fixture(scope="module")
+def sampled(asked):
+    return ml.marginal(*asked, QUERY, width_limit=8, precision=0.01, seed=3)
+
+
+def test_wide_components_are_sampled(asked, sampled):
+    exact = ml.marginal(*asked, QUERY)
+    assert exact.status == "exact"
+    assert sampled.status.startswith("sampled, standard errors up to 0.0")
+    assert sampled.methods[QUERY.index("Cancer(P0)") + 4] == "evidence"
+    off = np.abs(sampled.probabilities - exact.probabilities)
+    assert (off <= 5 * sampled.error).all()
+    assert (sampled.low <= sampled.probabilities).all()
+    assert (sampled.probabilities <= sampled.high).all()
+    assert "R-hat" in str(sampled)
+    assert {"r_hat", "effective_size", "low", "high"} <= set(sampled.to_dict()["marginals"][0])
+
+
+def test_exact_refuses(asked):
+    with pytest.raises(ml.LimitReached, match="hang together"):
+        ml.marginal(*asked, QUERY, width_limit=8, method="exact")
+
+
+def test_time_limit_is_named(asked):
+    result = ml.marginal(*asked, QUERY, width_limit=8, precision=1e-6, time_limit=0.5)
+    assert "time limit reached" in result.status
+    assert np.isfinite(result.probabilities).all()
+
+
+def test_traces_name_formulas(sampled):
+    assert any(name.startswith("log-weight") for name in sampled.traces)
+    assert all(trace.shape[0] == 4 for trace in sampled.traces.values())
+
+
+@pytest.mark.parametrize("version", ["0.22.0", "1.0.0"])
+def test_arviz_of_both_generations(monkeypatch, sampled, version):
+    def from_dict(*groups, **more):
+        assert bool(groups) == version.startswith("1")
+        return {**(groups[0] if groups else more), "coords": more["coords"], "dims": more["dims"]}
+
+    monkeypatch.setitem(sys.modules, "arviz", SimpleNamespace(__version__=version, from_dict=from_dict))
+    data = sampled.to_inference_data()
+    n_atoms = len(data["coords"]["atom"])
+    assert data["posterior"]["probability"].shape[::2] == (4, n_atoms)
+    assert data["coords"]["atom"][0] == "Smokes(P0)"
+
+
+def test_nothing_sampled_nothing_exported(asked):
+    with pytest.raises(ml.QueryMistake, match="nothing was sampled"):
+        ml.marginal(*asked, "Smokes").to_inference_data()
