@@ -121,15 +121,9 @@ def find_rules(
         column_of[w]: r for w, r in zip(range(n_weights - len(rules), n_weights), rules, strict=True) if w in column_of
     }
     found = _search(problem, tried, most_rules)
-    random, kept = np.random.default_rng(seed), dict.fromkeys(found.columns, 0)
-    for _ in range(resamples):
-        again = _search(_resampled(problem, random), tried, most_rules)
-        for j in again.columns:
-            if j in kept:
-                kept[j] += 1
+    kept = _stability(problem, tried, most_rules, (resamples, seed))
     made = [
-        Rule(tried[j], float(found.x[j]), s, float(chi2.sf(s, 1)), kept[j] / max(1, resamples))
-        for j, s in found.columns.items()
+        Rule(tried[j], float(found.x[j]), s, float(chi2.sf(s, 1)), kept.get(j, 0.0)) for j, s in found.columns.items()
     ]
     result = model_from_text("\n".join([model_text(model), *units, *(r.text for r in made)]), dialect=model.dialect)
     return Structure(tuple(made), result, len(rules))
@@ -148,6 +142,16 @@ def _has_unit(model: Model, name: str) -> bool:
         isinstance(t.formula.body, AtomRef) and t.formula.atoms[t.formula.body.index].predicate == name
         for t in model.templates
     )
+
+
+def _stability(problem: Problem, tried: dict[int, str], most_rules: int, samples: tuple[int, int]) -> dict[int, float]:
+    """In which share of bootstrap samples (their number, seed) each column is found."""
+    n, seed = samples
+    random, share = np.random.default_rng(seed), dict.fromkeys(tried, 0.0)
+    for _ in range(n):
+        for j in _search(_resampled(problem, random), tried, most_rules).columns:
+            share[j] += 1 / n
+    return share
 
 
 def _resampled(problem: Problem, random: np.random.Generator) -> Problem:
