@@ -68,7 +68,9 @@ _HOMES = {
     "scene": "Layout Scene make_scene",
 }
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split()}
-_PARTS = ("pinocchio", "coal", "trimesh", "scipy", "numpy", "numba", "pink", "matplotlib", "viser", "pandas", "pingouin")
+_PARTS = (
+    "pinocchio", "coal", "trimesh", "scipy", "numpy", "numba", "pink", "matplotlib", "viser", "pandas", "pingouin",
+)  # fmt: skip
 
 
 def load(module: str) -> Any:  # noqa: ANN401 - a module is what its user knows it to be

@@ -21,7 +21,9 @@ def demo(out: str, thing: str, task: str, level: str) -> None:
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     rows = [row for row in generate.generate() if row.thing != thing]
-    click.echo(f"training on {len(rows):,} generated instances of {len({r.thing for r in rows})} objects, {thing} left out")
+    click.echo(
+        f"training on {len(rows):,} generated instances of {len({r.thing for r in rows})} objects, {thing} left out"
+    )
     learned = training.train(words.read_knowledge(), generate.facts_of(rows))
     training.write_knowledge(learned, folder / "handover-learnt.mln")
     knowledge, known = asking.open_knowledge(learned.model), load("objects").read_object(thing)

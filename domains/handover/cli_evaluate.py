@@ -10,7 +10,9 @@ from mlnlite.domains.handover import load
 
 
 @click.command()
-@click.option("--out", "-o", default="out/evaluation", show_default=True, type=click.Path(file_okay=False), help="Folder.")
+@click.option(
+    "--out", "-o", default="out/evaluation", show_default=True, type=click.Path(file_okay=False), help="Folder."
+)
 @click.option("--splits", default=200, show_default=True, help="Repetitions of the paper's protocol.")
 @click.option("--data", type=click.Path(file_okay=False), help="Folder with the authors' files, handover/dataset.db.")
 @click.option("--seed", default=0, show_default=True, help="Of instances, splits, folds.")

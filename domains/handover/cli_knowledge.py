@@ -11,7 +11,7 @@ import click
 from mlnlite.domains.handover import load
 
 _LABELS = click.option("--labels", default="sampled", show_default=True,
-                       help="sampled: drawn from the study's preferences; preferred: what most of the level prefer.")  # fmt: skip
+                       help="sampled from the study's preferences, or what is preferred.")  # fmt: skip
 _SEED = click.option("--seed", default=0, show_default=True, help="Of every draw.")
 _CATALOGUE = click.option("--catalogue", type=click.Path(dir_okay=False), help="A TOML file of your own objects.")
 

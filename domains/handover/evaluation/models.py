@@ -98,7 +98,9 @@ def _normalised(logs: Float) -> Float:
 
 def pairwise_text(question: Question) -> str:
     """Logistic regression on all facts and pairs of facts, as a Markov logic model."""
-    atoms = {name: (f"{name}(+v_{name})" if name == "armMobility" else f"{name}(o, +v_{name})") for name in question.given}
+    atoms = {
+        name: (f"{name}(+v_{name})" if name == "armMobility" else f"{name}(o, +v_{name})") for name in question.given
+    }
     lines = [f"{name}(t_{name}?)" if name == "armMobility" else f"{name}(object, t_{name})" for name in question.given]
     target = f"{question.predicate}(o, +label)"
     lines += [f"{question.predicate}(object, label!)", target]

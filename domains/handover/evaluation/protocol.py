@@ -117,9 +117,7 @@ def _best(found: ml.Marginals) -> dict[tuple[str, str], str]:
 Means = Mapping[tuple[str, str], MeanPose]
 
 
-def _judged(
-    row: Instance, answer: tuple[int, str], placed: Mapping[Cell, Placed], means: Means
-) -> dict[str, float]:
+def _judged(row: Instance, answer: tuple[int, str], placed: Mapping[Cell, Placed], means: Means) -> dict[str, float]:
     """What of an answer is right."""
     region, method = answer
     right = {"method": float(method == row.method), "region": float(region == row.region)}

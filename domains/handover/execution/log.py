@@ -14,7 +14,7 @@ from mlnlite.domains.handover.execution.machine import Run
 
 
 def write_log(run: Run, path: str | Path) -> None:
-    """One JSON object for each step: `t_s`, `state`, `q_rad`, `hand_m`, `face_m`, `clearance_m`, `event`; then the end."""
+    """One JSON object for each step: time, state, joints, what was seen, clearance, event; then one for the end."""
     with Path(path).open("w", encoding="utf-8") as file:
         for m in run.moments:
             seen = None if m.sight is None else np.round(m.sight.hand, 4).tolist()

@@ -259,4 +259,3 @@ _STEPS: dict[str, Callable[[Job, _Mind, float], _Mind]] = {
     "perceive": _perceive, "infer": _infer, "plan": _plan, "grasp": _grasp, "approach": _approach, "hold": _hold,
     "release": _release, "abort": _back,
 }  # fmt: skip
-

@@ -1,4 +1,4 @@
-"""Plans: a scene and an answer in, where the robot goes and how out; again, with the object in hand, when hands move."""
+"""Plans: a scene and an answer in, where the robot goes and how out; also anew, with the object in hand."""
 
 from __future__ import annotations
 

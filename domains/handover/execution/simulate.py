@@ -145,7 +145,9 @@ def simulate(
 def scene_at(case: Case, sight: Sight | None) -> Scene:
     """The scene of a case with the hand as seen, or at rest."""
     layout = COARSE if sight is None else replace(COARSE, hand=np.round(sight.hand, 3))
-    scene = make_scene(read_object(case.thing), case.task, read_receiver(case.level), read_robot(case.robot), layout=layout)
+    scene = make_scene(
+        read_object(case.thing), case.task, read_receiver(case.level), read_robot(case.robot), layout=layout
+    )
     return scene
 
 
@@ -207,12 +209,14 @@ def summary(outcomes: Sequence[Outcome]) -> str:
         f"{len(outcomes):,} simulated executions: {sum(o.end == 'done' for o in outcomes):,} done, "
         f"{sum(o.end == 'aborted' for o in outcomes):,} aborted; {sum(o.violations > 0 for o in outcomes)} with a "
         f"safety violation; {sum(o.late for o in outcomes)} beyond their time limit; nearest motion "
-        f"{100 * min(moved, default=float('nan')):.1f} cm from hand or face; {sum(o.replans for o in outcomes):,} new plans",
+        f"{100 * min(moved, default=float('nan')):.1f} cm from hand or face; "
+        f"{sum(o.replans for o in outcomes):,} new plans",
         "", "| script | done | aborted | causes |", "|---|---|---|---|",
     ]  # fmt: skip
     for script in SCRIPTS:
         chosen = [o for o in outcomes if o.case.script == script]
         causes = Counter(o.cause for o in chosen if o.cause).most_common()
         text = ", ".join(f"{cause} {n}" for cause, n in causes) or "-"
-        lines.append(f"| {script} | {sum(o.end == 'done' for o in chosen)} | {sum(o.end == 'aborted' for o in chosen)} | {text} |")
+        ends = [sum(o.end == end for o in chosen) for end in ("done", "aborted")]
+        lines.append(f"| {script} | {ends[0]} | {ends[1]} | {text} |")
     return "\n".join(lines) + "\n"

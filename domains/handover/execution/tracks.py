@@ -79,7 +79,9 @@ def scripted(
         goals = hand + 0.05 * np.sin(rate * step * np.arange(n)[:, None] + phase)
     elif script == "lunge":
         begin = int(rng.uniform(0.3, 4.0) / step)
-        goals[begin : begin + int(rng.uniform(0.5, 3.0) / step)] = hand + np.array([rng.uniform(0.2, 0.5), *rng.uniform(-0.1, 0.1, 2)])
+        goals[begin : begin + int(rng.uniform(0.5, 3.0) / step)] = hand + np.array(
+            [rng.uniform(0.2, 0.5), *rng.uniform(-0.1, 0.1, 2)]
+        )
     elif script == "withdraw":
         goals[int(rng.uniform(0.3, 5.0) / step) :] = hand + np.array([-0.2, -0.2, -0.3])
     face_goals = face + 0.02 * np.sin(0.7 * step * np.arange(n)[:, None] + rng.uniform(0, 6.3, 3))

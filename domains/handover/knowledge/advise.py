@@ -1,4 +1,4 @@
-"""Advice: a learnt model and a question in, the reasoned answer with poses out, as text a therapist can read or as data."""
+"""Advice: a learnt model and a question in, the reasoned answer with poses out, in words or as data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reasons: two worlds that differ in one answer in, what each formula adds to the odds of the first over the second out.
+"""Reasons: two worlds that differ in one answer in, what each formula adds to the odds of the first out.
 
 The log-odds of two worlds that differ in one answer are a sum over the formulas, so the ledger is complete: its
 entries add up to the log-odds of the answer over the runner-up.

@@ -105,8 +105,12 @@ def _effect(aspect: str, row: dict[str, object]) -> Effect:
     cells = {key.replace("-", "_"): value for key, value in row.items()}
     p = float(str(cells["p_unc"]))
     corrected = float(str(cells.get("p_GG_corr", "nan")))
-    return Effect(aspect, str(cells["Source"]), (float(str(cells["DF1"])), float(str(cells["DF2"]))),
-                  float(str(cells["F"])), p if np.isnan(corrected) else corrected, float(str(cells["np2"])))  # fmt: skip
+    dof, f, eta2 = (
+        (float(str(cells["DF1"])), float(str(cells["DF2"]))),
+        float(str(cells["F"])),
+        float(str(cells["np2"])),
+    )
+    return Effect(aspect, str(cells["Source"]), dof, f, p if np.isnan(corrected) else corrected, eta2)
 
 
 def ordinal_check(survey: Survey) -> tuple[Ordinal, ...]:

@@ -36,13 +36,14 @@ def write_report(survey: Survey, folder: Path) -> None:
 def _published() -> str:
     table = published()
     found = association(table.counts)
-    rows = [f"| {level} | {' | '.join(map(str, counts))} | {sum(counts)} | {n} |"
-            for level, counts, n in zip(table.levels, table.counts.tolist(), table.participants.tolist(), strict=True)]  # fmt: skip
+    columns = zip(table.levels, table.counts.tolist(), table.participants.tolist(), strict=True)
+    rows = [f"| {level} | {' | '.join(map(str, counts))} | {sum(counts)} | {n} |" for level, counts, n in columns]
     return "\n".join([
         "## Preferences as published", "",
         "| level | A | B | ours | answers | participants |", "|---|---|---|---|---|---|", *rows, "",
         f"chi2({found.dof}) = {found.chi2:.1f}, p = {found.p:.1g}, Cramer's V = {found.cramers_v:.2f}. "
-        f"Who knows the level guesses the method right in at most {100 * bayes_ceiling(table.counts):.1f} % (Bayes ceiling).",
+        f"Who knows the level guesses the method right in at most {100 * bayes_ceiling(table.counts):.1f} % (Bayes "
+        "ceiling).",
     ])  # fmt: skip
 
 
@@ -61,7 +62,8 @@ def _preferences(survey: Survey) -> str:
 def _anova(survey: Survey) -> str:
     lines = ["## Ratings: mixed analysis of variance", "",
              "Level between people, method within; p of the method is Greenhouse-Geisser corrected.", "",
-             "| aspect | effect | degrees of freedom | F | p | partial eta squared |", "|---|---|---|---|---|---|"]  # fmt: skip
+             "| aspect | effect | degrees of freedom | F | p | partial eta squared |",
+             "|---|---|---|---|---|---|"]  # fmt: skip
     for e in analysis.mixed_anova(survey):
         lines.append(
             f"| {e.aspect} | {e.source} | {e.dof[0]:.0f}, {e.dof[1]:.0f} | {e.f:.2f} | {e.p:.2g} | {e.eta2:.3f} |"

@@ -1,5 +1,7 @@
-"""A simulated survey, for trying the analysis: nobody was asked. Preferences have the published counts; the ratings,
-ranks and comments are inventions of this file, and every output says so.
+"""A simulated survey, for trying the analysis: nobody was asked.
+
+Preferences have the published counts; the ratings, ranks and comments are inventions of this file, and every output
+says so.
 """
 
 from __future__ import annotations
