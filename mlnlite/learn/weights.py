@@ -42,8 +42,7 @@ def learn(
     """Weights that make the databases most likely.
 
     The databases are complete but for the open predicates: an atom that is not a fact is false. By default each atom,
-    and each block of a functional predicate, is predicted from all others (pseudo-likelihood: Besag 1975; Richardson
-    and Domingos 2006).
+    or block, is predicted from all others (pseudo-likelihood: Besag 1975; Richardson and Domingos 2006).
 
     Args:
         model: its weights are ignored, except fixed ones and hard formulas.
@@ -75,10 +74,10 @@ def learn(
     )
     counted = monotonic()
     solution = _solved(model, found, prior, deadline)
+    learned = _learned(replace(model, types=_types(model, databases)), found, solution)
     seconds = {"count": counted - start, "solve": monotonic() - counted}
-    learned = _learned(replace(model, types=_types(model, databases)), found, solution, seconds)
     how = How(objective, None if predict is None else tuple(sorted(targets)), tuple(sorted(unknown)))
-    return replace(learned, prior=prior, objective=_title(objective, predict is not None), how=how)
+    return replace(learned, prior=prior, objective=_title(objective, predict is not None), how=how, seconds=seconds)
 
 
 def _title(objective: Objective, conditional: bool) -> str:
@@ -158,7 +157,7 @@ def _solved(model: Model, problem: Problem, prior: Prior | None, deadline: float
     return solve_hierarchical(problem, penalty, groups, deadline)
 
 
-def _learned(model: Model, problem: Problem, solution: Solution, seconds: dict[str, float]) -> LearnedModel:
+def _learned(model: Model, problem: Problem, solution: Solution) -> LearnedModel:
     optimum, unbounded = solution.optimum, np.zeros(len(problem.weights), np.int8)
     unbounded[problem.free] = solution.unbounded
     unsupported = problem.learnable.copy()
@@ -179,7 +178,7 @@ def _learned(model: Model, problem: Problem, solution: Solution, seconds: dict[s
         status=optimum.status,
         gradient=optimum.gradient,
         iterations=optimum.iterations,
-        seconds=seconds,
+        seconds={},
         history=optimum.history,
         how=How(),
         problem=problem,
