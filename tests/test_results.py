@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,7 +85,8 @@ def test_states_print_what_is_true_and_what_it_costs():
         "status: feasible, log-weight 2.500000, bound 3.000000, gap 0.5",
         "0 unknown atoms, 0 factors, 0 components",
     ]
-    assert "pays for 1 more formulas" in state().to_text(1)
+    many = replace(state(), violated=tuple(Violation(f"P{i}(x)", 1, 0.5 + i) for i in range(12)))
+    assert "pays 2 for 2 more formulas" in many.to_text()
 
 
 def test_states_are_mappings_and_travel():
