@@ -82,3 +82,27 @@ def rivals(n_people: int = 1000, degree: float = 4.0, share: float = 0.3, seed: 
     }
     model = ml.model_from_text(RIVALS)
     return model, evidence_of(model, {"person": n_people}, facts)
+
+
+def entities(n: int = 100, noise: float = 0.05, hard: bool = True, seed: int = 0) -> tuple[Model, Evidence]:
+    """Entity resolution: records of hidden entities, ten each, and similarities of which a share is wrong.
+
+    `Same(x, y)` for every ordered pair, symmetric and transitive.
+    """
+    rng = np.random.default_rng(seed)
+    entity = rng.integers(0, max(1, n // 10), n)
+    same = entity[:, None] == entity[None, :]
+    seen = np.triu(same ^ (rng.random((n, n)) < noise), 1)
+    seen |= seen.T
+    model = ml.model_from_text(
+        "*Similar(record, record)\nSame(record, record)\n"
+        "2.0 Similar(x, y) => Same(x, y)\n"
+        "1.5 !Similar(x, y) => !Same(x, y)\n"
+        "Same(x, y) => Same(y, x).\n"
+        + ("" if hard else "1.0 ")
+        + "Same(x, y) ^ Same(y, z) => Same(x, z)"
+        + ("." if hard else "")
+        + "\n"
+    )
+    facts = {"Similar": np.concatenate([np.argwhere(seen), np.stack([np.arange(n)] * 2, axis=1)])}
+    return model, evidence_of(model, {"record": n}, facts)

@@ -84,7 +84,7 @@ def _sender_shapes(tree: Tree, cardinality: Int32) -> list[tuple[int, ...]]:
     return shapes
 
 
-def _combined(tree: Tree, cardinality: Int32, cells: Sequence[Cells]) -> Iterator[tuple[int, Float, list[Float]]]:
+def combined(tree: Tree, cardinality: Int32, cells: Sequence[Cells]) -> Iterator[tuple[int, Float, list[Float]]]:
     """Clique by clique: its number, its table with all messages to it, and the list to append its own message to."""
     shapes = _sender_shapes(tree, cardinality)
     inbox: dict[int, list[Float]] = {}
@@ -112,7 +112,7 @@ def log_sum(tree: Tree, cardinality: Int32, cells: Sequence[Cells], wanted: Bool
     keep = _on_the_way(tree, wanted)
     conditional: dict[int, Float] = {}
     total = 0.0
-    for k, table, out in _combined(tree, cardinality, cells):
+    for k, table, out in combined(tree, cardinality, cells):
         peak = table.max(axis=0)
         peak[np.isneginf(peak)] = 0.0
         table -= peak
@@ -184,7 +184,7 @@ def best_world(tree: Tree, cardinality: Int32, cells: Sequence[Cells]) -> tuple[
     """
     tables: list[Float] = []
     total = 0.0
-    for k, table, out in _combined(tree, cardinality, cells):
+    for k, table, out in combined(tree, cardinality, cells):
         tables.append(table)
         out.append(table.max(axis=0))
         if tree.parents[k] < 0:

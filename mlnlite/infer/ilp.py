@@ -120,7 +120,8 @@ def _answer(solver: highspy.Highs, columns: Columns, part: Part) -> PartAnswer:
     info, status, highest = solver.getInfo(), solver.getModelStatus(), all_gains(part)
     bound = highest - info.mip_dual_bound + _ABSOLUTE + _RELATIVE * abs(info.mip_dual_bound)
     if info.primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
-        return PartAnswer(None, min(bound, highest), False, ILP)
+        impossible = status == highspy.HighsModelStatus.kInfeasible
+        return PartAnswer(None, -np.inf if impossible else min(bound, highest), False, ILP)
     x = np.array(solver.getSolution().col_value)[: columns.n]
     proved = status == highspy.HighsModelStatus.kOptimal and info.mip_gap <= _RELATIVE
     return PartAnswer(world_of(part, columns, x), min(bound, highest), proved, ILP)

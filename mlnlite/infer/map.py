@@ -14,6 +14,7 @@ from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.deadline import in_seconds, interruptible
 from mlnlite.infer.dominance import without_dominated
 from mlnlite.infer.elimination import best_world
+from mlnlite.infer.equivalence import contracted, put_back_ties
 from mlnlite.infer.marginal import CLOSED_FORM, ELIMINATION, MEMORY_LIMIT, WIDTH_LIMIT, limit_reached
 from mlnlite.infer.narrow import narrowed
 from mlnlite.infer.order import TooWide, plan
@@ -27,7 +28,7 @@ from mlnlite.infer.score import log_weight, truth_of
 SAT = "satisfiability"
 _CHEAP = 1 << 18
 _CHEAP_IN_ALL = 1 << 20
-_DENSE = 16
+_DENSE, _SPARSE, _MANY = 16, 5, 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +105,14 @@ def map_of(
         QueryMistake: a weight is not known, or the method cannot answer such a network.
     """
     deadline = in_seconds(time_limit)
-    potentials = without_dominated(potentials_of(network, max_arity=np.inf))
+    tied, ties = contracted(potentials_of(network, max_arity=np.inf))
+    potentials = without_dominated(tied)
     core, leaves = peel(potentials, maximise=True) if method in ("auto", "ve") else (potentials, ())
     with interruptible(deadline):
         search, label = _climb(network, core, Options(method, deadline, seed, gap), width_limit)
     put_back_values(leaves, search.values)
-    label = put_back_labels(leaves, label)
+    put_back_ties(ties, search.values)
+    label = put_back_labels(leaves, label)[ties.leader]
     for component in np.unique(label[changed_by(leaves)]).tolist():
         search.method[component] = search.method[component].replace(CLOSED_FORM, ELIMINATION)
     return _answer(network, label, search)
@@ -173,7 +176,8 @@ def _eliminate(part: Part, method: Method, width_limit: int, search: _Search) ->
     largest, total = width_limit, max(MEMORY_LIMIT, width_limit)
     if method == "auto":
         largest, total = min(width_limit, _CHEAP), _CHEAP_IN_ALL
-        if sum(len(c.amount) for c in part.cells if c.scope.shape[1] > 1) > _DENSE * len(part.variables):
+        n_cells = sum(len(c.amount) for c in part.cells if c.scope.shape[1] > 1)
+        if n_cells > (_DENSE if len(part.variables) < _MANY else _SPARSE) * len(part.variables):
             return False
     n, part = len(part.variables), narrowed(part)
     tree = plan(part.cardinality, [c.scope for c in part.cells], largest, total)
@@ -202,4 +206,4 @@ def _choose(network: Network, part: Part, answers: list[PartAnswer], search: _Se
     search.best[part.component] = value
     search.method[part.component] = next((a.method for a in answers if a.optimal), name)
     search.status[part.component] = "optimal" if proved else "feasible"
-    search.gap[part.component] = max(0.0, min(all_gains(part), *(a.bound for a in answers)) - value)
+    search.gap[part.component] = max(0.0, min([all_gains(part), *(a.bound for a in answers)]) - value)

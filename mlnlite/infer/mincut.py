@@ -20,6 +20,7 @@ from mlnlite.infer.parts import Part, PartAnswer, value_of
 
 MINCUT = "mincut"
 _DIGITS = 12
+_SAMPLE = 1000
 _LARGEST = 2.0**60
 
 
@@ -63,7 +64,7 @@ def quadratic(part: Part) -> Quadratic | None:
     """A component as a quadratic function; None if it has cells of three literals, blocks or forbidden pairs."""
     if any(c.scope.shape[1] > 2 for c in part.cells) or (part.cardinality != 2).any():
         return None
-    n, amounts = len(part.variables), np.concatenate([c.amount for c in part.cells])
+    n, amounts = len(part.variables), np.concatenate([np.zeros(0), *(c.amount for c in part.cells)])
     if not np.isfinite(amounts).all():
         return None
     scale = _scale(amounts)
@@ -88,12 +89,16 @@ def quadratic(part: Part) -> Quadratic | None:
 def _scale(amounts: Float) -> float:
     """The smallest power of ten that makes all amounts integers, or the largest one that is safe."""
     room = int(np.floor(np.log10(_LARGEST / max(1.0, 4 * float(np.abs(amounts).sum())))))
-    distinct = np.unique(amounts)
     for digits in range(min(room, _DIGITS)):
-        shifted = distinct * 10.0**digits
-        if (np.abs(shifted - np.rint(shifted)) <= 1e-9).all():
+        if _are_integers(amounts[:_SAMPLE], digits) and _are_integers(amounts, digits):
             return 10.0**digits
     return float(10.0 ** min(room, _DIGITS))
+
+
+def _are_integers(amounts: Float, digits: int) -> bool:
+    """Whether amounts have at most so many decimals."""
+    shifted = amounts * 10.0**digits
+    return bool((np.abs(shifted - np.rint(shifted)) <= 1e-9).all())
 
 
 def _summed(scope: np.ndarray, product: Int64, n: int) -> tuple[Int64, Int64, Int64]:

@@ -110,7 +110,7 @@ def _ladder(part: Part, options: Options, ask: Ask) -> list[tuple[Rung, float]]:
     if n_cells > _TOO_MANY:
         return [*steps, *single["annealing"]]
     tried = [(by_wcsp, _FIRST_TRY)] if toulbar2.is_available() else []
-    mixed = (part.cardinality > 2).any() or max(c.scope.shape[1] for c in part.cells) == 3
+    mixed = (part.cardinality > 2).any() or max((c.scope.shape[1] for c in part.cells), default=0) == 3
     if len(part.variables) <= _FEW and mixed:
         return [*steps, *tried, (by_annealing, inf), (by_ilp, inf)]
     relaxed: list[tuple[Rung, float]] = [(_by_relaxation, 4 * _FIRST_TRY)] if n_cells > _MANY else []
