@@ -277,7 +277,20 @@ def test_query_options_that_do_not_fit_the_task(folder):
 def test_query_past_the_limit_has_exit_code_1(folder):
     (folder / "m.mln").write_text("P(t)\nQ(t, t)\n1 P(x) ^ Q(x, y) ^ P(y)\n")
     (folder / "e.db").write_text("\n".join(f"P(A{i})" if i < 1 else f"Q(A{i}, A{i})" for i in range(9)))
-    result = run("query", folder / "m.mln", "-e", folder / "e.db", "-q", "P", "--width-limit", "4", "--method", "exact", "--format", "json")
+    result = run(
+        "query",
+        folder / "m.mln",
+        "-e",
+        folder / "e.db",
+        "-q",
+        "P",
+        "--width-limit",
+        "4",
+        "--method",
+        "exact",
+        "--format",
+        "json",
+    )
     assert result.exit_code == 1
     assert json.loads(result.stderr)["error"] == "LimitReached"
 
