@@ -9,7 +9,6 @@ import numpy as np
 
 from mlnlite.ground.network import Int32, Int64, Network
 
-
 _FEW = 2000
 
 
