@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.arviz import inference_data
-from mlnlite.errors import MissingPart, QueryMistake, did_you_mean
-from mlnlite.table import SHOWN, html_table, text_table
+from mlnlite.errors import QueryMistake, did_you_mean
+from mlnlite.table import SHOWN, data_frame, html_table, text_table
 
 if TYPE_CHECKING:
     import pandas as pd
-
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -194,7 +193,7 @@ class Marginals(Mapping[str, float]):
         Raises:
             MissingPart: pandas is not installed.
         """
-        return _frame(self.columns())
+        return data_frame(self.columns())
 
     def columns(self) -> dict[str, list[object]]:
         """All that is known of each row, by name of the column; what sampling adds only if there was any."""
@@ -202,7 +201,7 @@ class Marginals(Mapping[str, float]):
         given = sampled if self.draws else {}
         numbers = {name: [_number(x) for x in values.tolist()] for name, values in given.items() if values is not None}
         return {
-            "name": list(self.names),
+            "name": [*self.names],
             "probability": list(self.probabilities.tolist()),
             "method": list(self.methods),
             "exact": list(self.exact.tolist()),
@@ -260,6 +259,8 @@ class MapState(Mapping[str, bool]):
             where it is negative; nan if nobody worked it out.
         open_cost: the part of it on groundings that evidence leaves open.
         gap: how much larger the log-weight of another world (or smaller its cost) could at most be.
+        margins: shape (n,), how much log-weight the best world loses in which the atom is the other way round:
+            infinity if it cannot be, nan if that is not known; None if nobody asked.
     """
 
     names: tuple[str, ...]
@@ -274,6 +275,7 @@ class MapState(Mapping[str, bool]):
     cost: float = float("nan")
     open_cost: float = float("nan")
     gap: float = float("nan")
+    margins: Float | None = None
     _index: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -360,7 +362,7 @@ class MapState(Mapping[str, bool]):
         Raises:
             MissingPart: pandas is not installed.
         """
-        return _frame({"name": self.names, "truth": self.truth, "method": self.methods})
+        return data_frame({"name": self.names, "truth": self.truth, "method": self.methods})
 
 
 _HEAD = ("atom or formula", "probability", "method")
@@ -399,12 +401,3 @@ def _order(names: Sequence[str], block: Int64 | None) -> list[int]:
     first = [i if b < 0 else blocks.setdefault(b, i) for i, b in enumerate([] if block is None else block.tolist())]
     place = first or range(len(names))
     return sorted(range(len(names)), key=lambda i: (predicates[names[i].partition("(")[0]], place[i], i))
-
-
-def _frame(columns: Mapping[str, object]) -> pd.DataFrame:
-    """A data frame of columns."""
-    try:
-        import pandas as pd
-    except ImportError as error:
-        raise MissingPart("pandas is not installed", hint="pip install pandas") from error
-    return pd.DataFrame({name: list(column) for name, column in columns.items()})  # type: ignore[call-overload]

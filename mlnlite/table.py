@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
+from typing import TYPE_CHECKING
+
+from mlnlite.errors import MissingPart
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHOWN = 60
 """Rows that are shown unless all are asked for."""
@@ -26,3 +32,12 @@ def html_table(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str)
     top = "".join(f"<th>{escape(h)}</th>" for h in head)
     caption = f"<caption>{escape(caption)}{more}</caption>"
     return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def data_frame(columns: Mapping[str, object]) -> pd.DataFrame:
+    """A data frame of columns."""
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise MissingPart("pandas is not installed", hint="pip install pandas") from error
+    return pd.DataFrame({name: list(column) for name, column in columns.items()})  # type: ignore[call-overload]
