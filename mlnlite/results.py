@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mlnlite.arviz import inference_data
 from mlnlite.errors import QueryMistake, did_you_mean
-from mlnlite.table import SHOWN, data_frame, html_table, text_table
+from mlnlite.table import SHOWN, data_frame, html_table, json_number, number_cell, order_of_rows, text_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -141,10 +141,10 @@ class Marginals(Mapping[str, float]):
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Cells of the table."""
-        order = _order(self.names, self.block)
+        order = order_of_rows(self.names, self.block)
         rows = []
         for i in order:
-            extra = [_cell(values[i], form) for values, form in self._diagnostics()]
+            extra = [number_cell(values[i], form) for values, form in self._diagnostics()]
             rows.append((self.names[i], self._bar(i), *extra, self.methods[i]))
         return rows
 
@@ -178,7 +178,7 @@ class Marginals(Mapping[str, float]):
         columns = self.columns()
         return {
             "status": self.status,
-            "log_z": _number(self.log_z),
+            "log_z": json_number(self.log_z),
             "marginals": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
             "statistics": self.statistics.to_dict(),
         }
@@ -199,7 +199,9 @@ class Marginals(Mapping[str, float]):
         """All that is known of each row, by name of the column; what sampling adds only if there was any."""
         sampled = {"low": self.low, "high": self.high, "r_hat": self.r_hat, "effective_size": self.effective_size}
         given = sampled if self.draws else {}
-        numbers = {name: [_number(x) for x in values.tolist()] for name, values in given.items() if values is not None}
+        numbers = {
+            name: [json_number(x) for x in values.tolist()] for name, values in given.items() if values is not None
+        }
         return {
             "name": [*self.names],
             "probability": list(self.probabilities.tolist()),
@@ -325,11 +327,18 @@ class MapState(Mapping[str, bool]):
         if isfinite(self.cost):
             open_ = f"{self.open_cost:.6f} of it where evidence leaves a choice"
             summary.insert(0, f"cost: {self.cost:.6f}, {open_}; no world costs less than {self.cost - self.gap:.6f}")
-        return text_table(("true atom", "method"), self._rows(), limit, [*paid, *summary, str(self.statistics)])
+        return text_table(self._head(), self._rows(), limit, [*paid, *summary, str(self.statistics)])
+
+    def _head(self) -> tuple[str, ...]:
+        """Names of the columns of the table."""
+        return ("true atom", "method") if self.margins is None else ("true atom", "margin", "method")
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Cells of the table."""
-        return [(self.names[i], self.methods[i]) for i in _order(self.names, self.block) if self.truth[i]]
+        true = [i for i in order_of_rows(self.names, self.block) if self.truth[i]]
+        if self.margins is None:
+            return [(self.names[i], self.methods[i]) for i in true]
+        return [(self.names[i], f"{self.margins[i]:.4f}", self.methods[i]) for i in true]
 
     def _repr_html_(self) -> str:
         """A table for notebooks."""
@@ -338,16 +347,19 @@ class MapState(Mapping[str, bool]):
 
     def to_dict(self) -> dict[str, object]:
         """Plain data."""
+        numbers = None if self.margins is None else map(json_number, self.margins.tolist())
+        margins = None if numbers is None else dict(zip(self.names, numbers, strict=True))
         paid = [{"formula": v.formula, "n_groundings": v.n_groundings, "weight": v.weight} for v in self.violated]
         return {
             "status": self.status,
-            "log_weight": _number(self.log_weight),
-            "bound": _number(self.bound),
-            "gap": _number(self.gap),
-            "cost": _number(self.cost),
-            "open_cost": _number(self.open_cost),
+            "log_weight": json_number(self.log_weight),
+            "bound": json_number(self.bound),
+            "gap": json_number(self.gap),
+            "cost": json_number(self.cost),
+            "open_cost": json_number(self.open_cost),
             "true_atoms": list(self.true_atoms),
             "state": self.state,
+            "margins": margins,
             "violated": paid,
             "statistics": self.statistics.to_dict(),
         }
@@ -362,20 +374,11 @@ class MapState(Mapping[str, bool]):
         Raises:
             MissingPart: pandas is not installed.
         """
-        return data_frame({"name": self.names, "truth": self.truth, "method": self.methods})
+        columns: dict[str, object] = {"name": self.names, "truth": self.truth, "method": self.methods}
+        return data_frame(columns if self.margins is None else {**columns, "margin": self.margins})
 
 
 _HEAD = ("atom or formula", "probability", "method")
-
-
-def _cell(value: float, form: str) -> str:
-    """A number, or nothing."""
-    return format(value, form) if isfinite(value) else ""
-
-
-def _number(value: float) -> float | None:
-    """A number as JSON knows it."""
-    return value if isfinite(value) else None
 
 
 def _index_of(names: Sequence[str]) -> dict[str, int]:
@@ -390,14 +393,3 @@ def _find(index: Mapping[str, int], names: Sequence[str], name: str) -> int:
     if row is None:
         raise UnknownRowError(f"the result holds no {name}", hint=did_you_mean(name, names))
     return row
-
-
-def _order(names: Sequence[str], block: Int64 | None) -> list[int]:
-    """Rows predicate by predicate, block by block, otherwise as given."""
-    predicates: dict[str, int] = {}
-    for name in names:
-        predicates.setdefault(name.partition("(")[0], len(predicates))
-    blocks: dict[int, int] = {}
-    first = [i if b < 0 else blocks.setdefault(b, i) for i, b in enumerate([] if block is None else block.tolist())]
-    place = first or range(len(names))
-    return sorted(range(len(names)), key=lambda i: (predicates[names[i].partition("(")[0]], place[i], i))

@@ -45,7 +45,11 @@ _METHODS = {
     "tempering": ("marginal",),
     "ve": ("map",),
     "wcsp": ("map",),
+    "mincut": ("map",),
     "ilp": ("map",),
+    "maxsat": ("map",),
+    "annealing": ("map",),
+    "maxwalksat": ("map",),
 }
 
 
@@ -63,6 +67,8 @@ class _Options(TypedDict):
     seed: int
     precision: float
     chains: int
+    gap: float
+    margins: bool
     width_limit: int | None
     dialect: Dialect | None
     format: Literal["text", "json", "csv"]
@@ -105,6 +111,14 @@ class _Options(TypedDict):
     help="Largest standard error of probabilities that are sampled.",
 )
 @click.option("--chains", type=click.IntRange(min=2), default=4, show_default=True, help="How many are sampled.")
+@click.option(
+    "--gap",
+    type=click.FloatRange(min=0),
+    default=0.0,
+    show_default=True,
+    help="Of the most probable world: what share of its cost it may be away from the best.",
+)
+@click.option("--margins", is_flag=True, help="For each atom of that world, what the opposite would lose.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Where chance starts.")
 @click.option(
     "--width-limit",
@@ -147,6 +161,8 @@ def _answer(model: Model, evidence: Evidence, items: list[str], options: _Option
             method=cast("MapMethod", options["method"]),
             time_limit=options["time_limit"],
             seed=options["seed"],
+            gap=options["gap"],
+            margins=options["margins"],
         )
     return ml.marginal(
         model,

@@ -31,6 +31,7 @@ from mlnlite.model.unparse import row_text
 from mlnlite.results import MapState, Marginals, Statistics, Violation
 
 if TYPE_CHECKING:
+    from mlnlite.infer.cuttingplanes import Lazy
     from mlnlite.infer.rungs import Method
 
 Int64 = NDArray[np.int64]
@@ -120,6 +121,7 @@ def map_state(  # noqa: PLR0913
     time_limit: float | None = None,
     seed: int = 0,
     gap: float = 0.0,
+    margins: bool = False,
     engine: Engine | None = None,
 ) -> MapState:
     """A most probable world given evidence, with a bound that proves it or says how much better another could be.
@@ -134,6 +136,7 @@ def map_state(  # noqa: PLR0913
         time_limit: [s] for the search.
         seed: of the search.
         gap: good enough is a world that costs at most this share more than the best one.
+        margins: also find for each atom how much worse the best world is in which it is the other way round.
         engine: what runs the grounding plans; by default chosen by size.
 
     Raises:
@@ -141,14 +144,14 @@ def map_state(  # noqa: PLR0913
         Contradiction: if no world satisfies the evidence and the hard formulas.
         LimitReached: if there is no answer within the limits.
     """
-    asked = _ask(model, evidence, query, closed_world, engine)
+    asked = _ask(model, evidence, query, closed_world, engine, waits=True)
     return map_state_for(
-        asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, gap=gap,
-        ground_seconds=asked.seconds,
+        asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, gap=gap, margins=margins,
+        lazy=asked.lazy, ground_seconds=asked.seconds,
     )  # fmt: skip
 
 
-def map_state_for(
+def map_state_for(  # noqa: PLR0913
     network: Network,
     question: Question,
     *,
@@ -156,16 +159,26 @@ def map_state_for(
     time_limit: float | None = None,
     seed: int = 0,
     gap: float = 0.0,
+    margins: bool = False,
+    lazy: Lazy | None = None,
     ground_seconds: float = 0.0,
 ) -> MapState:
     """Answers a question about the most probable world of a network; see `map_state`."""
     if question.formulas:
         hint = "ask for atoms or predicates; the probability of a formula is a question for `marginal`"
         raise QueryMistake(f"the most probable world has atoms, not formulas: {question.formulas[0].text}", hint)
+    from mlnlite.infer.deadline import in_seconds
     from mlnlite.infer.map import map_of
+    from mlnlite.infer.rungs import Options
 
     start = perf_counter()
-    best = map_of(network, method=method, time_limit=time_limit, seed=seed, gap=gap)
+    if lazy is None:
+        best = map_of(network, method=method, time_limit=time_limit, seed=seed, gap=gap)
+    else:
+        from mlnlite.infer.cuttingplanes import map_lazily
+
+        lazy, best = map_lazily(lazy, Options(method, in_seconds(time_limit), seed, gap))
+        network = lazy.network
     index, truth = _locate(network, question.atoms)
     truth[index >= 0] = best.truth[index[index >= 0]]
     methods = [best.component_method[best.component[i]] if i >= 0 else EVIDENCE for i in index.tolist()]
@@ -181,6 +194,7 @@ def map_state_for(
         cost=float(total.sum()),
         open_cost=float(open_.sum()),
         gap=best.gap,
+        margins=_margins(network, best.truth, index, time_limit) if margins else None,
         violated=tuple(_violations(network, best.truth)),
         statistics=Statistics(
             network.n_atoms, network.n_factors, len(best.component_status), best.largest_table, seconds
@@ -243,6 +257,16 @@ def lifted_marginals(
     )
 
 
+def _margins(network: Network, truth: NDArray[np.bool_], index: Int64, time_limit: float | None) -> NDArray[np.float64]:
+    """What each row would lose if it were the other way round: infinity for known atoms."""
+    from mlnlite.infer.maxmarginals import margins_of
+
+    found = margins_of(network, truth, np.unique(index[index >= 0]), time_limit=time_limit)
+    margins = np.full(len(index), np.inf)
+    margins[index >= 0] = found[index[index >= 0]]
+    return margins
+
+
 # --- from the question to the network and back
 
 
@@ -251,6 +275,7 @@ class _Asked:
     question: Question
     network: Network
     seconds: float
+    lazy: Lazy | None = None
 
 
 def _ask(
@@ -259,16 +284,21 @@ def _ask(
     query: str | Sequence[str] | None,
     closed_world: str | Iterable[str],
     engine: Engine | None,
+    *,
+    waits: bool = False,
 ) -> _Asked:
     start = perf_counter()
-    if query is None:
-        network = ground(model, _closed(evidence, closed_world, frozenset()), engine=engine)
-        return _Asked(Question(network.atoms, (), frozenset()), network, perf_counter() - start)
-    question = question_of(query, model, evidence)
-    network = ground(
-        model, _closed(evidence, closed_world, question.predicates), query=question.all_atoms, engine=engine
-    )
-    return _Asked(question, network, perf_counter() - start)
+    question = None if query is None else question_of(query, model, evidence)
+    evidence = _closed(evidence, closed_world, frozenset() if question is None else question.predicates)
+    atoms, lazy = None if question is None else question.all_atoms, None
+    if waits:
+        from mlnlite.infer.cuttingplanes import without_lazy, worth_waiting
+
+        waiting = worth_waiting(model, evidence)
+        lazy = without_lazy(model, evidence, waiting, atoms, engine) if waiting else None
+    network = ground(model, evidence, query=atoms, engine=engine) if lazy is None else lazy.network
+    question = question or Question(network.atoms, (), frozenset())
+    return _Asked(question, network, perf_counter() - start, lazy)
 
 
 def _closed(evidence: Evidence, closed_world: str | Iterable[str], asked: frozenset[str]) -> Evidence:

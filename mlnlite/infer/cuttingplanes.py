@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
+from typing import Literal
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from mlnlite.ground.ground import forecasts, ground, prepared
 from mlnlite.ground.lazy import violations, world_evidence
 from mlnlite.ground.merge import merged_clauses
 from mlnlite.ground.network import Bool, Clauses, Int32, Int64, Network
-from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.map import BestWorld, map_of
+from mlnlite.infer.rungs import Options
+from mlnlite.infer.score import costs, log_weight
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import AtomRef, Equal
 from mlnlite.model.model import Model
@@ -28,6 +31,8 @@ from mlnlite.model.templates import Template
 
 LAZY_FROM = 300_000
 """Groundings of a formula that are worth waiting for."""
+
+_CLOSE = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,20 +88,83 @@ def _size(template: Template, evidence: Evidence) -> int:
     return prod(int(evidence.present[template.formula.variables[v].type].sum()) for v in free)
 
 
-def without_lazy(model: Model, evidence: Evidence, waiting: Sequence[int], engine: Engine | None = None) -> Lazy:
+def map_lazily(lazy: Lazy, options: Options, engine: Engine | None = None) -> tuple[Lazy, BestWorld]:
+    """A most probable world of the whole model, and what had to be generated for it.
+
+    Args:
+        lazy: a network that lacks groundings.
+        options: how to search; on the way worlds are kept that violate nothing hard.
+        engine: what runs the queries for violated groundings.
+
+    Raises:
+        Contradiction: no world satisfies the hard formulas.
+    """
+    found: list[tuple[float, BestWorld]] = []
+    bound, answer = np.inf, _solved(lazy, options)
+    while True:
+        more = with_violated(lazy, answer.truth, engine)
+        bound = min(bound, answer.log_weight + answer.gap)
+        found.append((log_weight(more.network, answer.truth), answer))
+        if more is lazy or options.deadline.is_over or _is_close(more, found, bound, options.gap):
+            break
+        lazy = more
+        answer = _solved(lazy, options)
+        if not answer.gap <= _CLOSE:  # a search that ends early may as well look for worlds that violate nothing
+            other = _solved(lazy, replace(options, method="annealing"))
+            lazy = with_violated(lazy, other.truth, engine)
+            found.append((log_weight(lazy.network, other.truth), other))
+    lazy, found = _with_nothing(lazy, found, engine)
+    value, best = max(found, key=lambda f: f[0])
+    gap = max(0.0, bound - value)
+    status: Literal["optimal", "feasible"] = "optimal" if gap <= _CLOSE else "feasible"
+    return more if more.generated > lazy.generated else lazy, replace(
+        best, log_weight=value, bound=value + gap, status=status, component_gap=np.array([gap])
+    )
+
+
+def _solved(lazy: Lazy, options: Options) -> BestWorld:
+    """A best world of what was generated so far."""
+    left = None if np.isinf(options.deadline.left) else max(1.0, options.deadline.left / 2)
+    return map_of(lazy.network, method=options.method, time_limit=left, seed=options.seed, gap=options.gap)
+
+
+def _is_close(lazy: Lazy, found: list[tuple[float, BestWorld]], bound: float, gap: float) -> bool:
+    """Whether the best world so far is proved, or close enough to the bound."""
+    value, best = max(found, key=lambda f: f[0])
+    if not np.isfinite(value):
+        return False
+    return bound - value <= max(_CLOSE, gap * float(costs(lazy.network, best.truth)[0].sum()))
+
+
+def _with_nothing(
+    lazy: Lazy, found: list[tuple[float, BestWorld]], engine: Engine | None
+) -> tuple[Lazy, list[tuple[float, BestWorld]]]:
+    """If no world is good for the whole model, the one in which nothing more is true than has to be."""
+    if any(np.isfinite(value) for value, _ in found):
+        return lazy, found
+    nothing = replace(found[-1][1], truth=np.zeros(lazy.network.n_atoms, np.bool_))
+    lazy = with_violated(lazy, nothing.truth, engine)
+    return lazy, [*found, (log_weight(lazy.network, nothing.truth), nothing)]
+
+
+def without_lazy(
+    model: Model, evidence: Evidence, waiting: Sequence[int], query: Int64 | None = None, engine: Engine | None = None
+) -> Lazy:
     """The network of all other templates, with the atoms of the lazy ones.
 
     Args:
         model: with all templates.
         evidence: one database.
         waiting: indices of the templates that are to wait.
+        query: numbers of further atoms that are to be in the network.
         engine: what runs the grounding plans.
     """
     others = tuple(t for i, t in enumerate(model.templates) if i not in waiting)
     expanded, completed, _ = prepared(replace(model, templates=tuple(model.templates[i] for i in waiting)), evidence)
     names = {a.predicate for t in expanded.templates for a in t.formula.atoms}
     ranges = [np.arange(*atom_range(evidence.predicates[n], completed)) for n in sorted(names)]
-    base = ground(replace(model, templates=others), evidence, query=np.concatenate(ranges), engine=engine)
+    asked = np.concatenate([*ranges, np.zeros(0, np.int64) if query is None else query])
+    base = ground(replace(model, templates=others), evidence, query=asked, engine=engine)
     first = len(base.model.templates)
     weights = np.concatenate([base.weights, *(t.weights for t in expanded.templates)])
     sizes = [len(t.weights) for t in expanded.templates]
@@ -112,15 +180,13 @@ def without_lazy(model: Model, evidence: Evidence, waiting: Sequence[int], engin
     return Lazy(network, tuple(range(first, first + len(sizes))))
 
 
-def with_violated(lazy: Lazy, truth: Bool, engine: Engine | None = None, deadline: Deadline | None = None) -> Lazy:
+def with_violated(lazy: Lazy, truth: Bool, engine: Engine | None = None) -> Lazy:
     """The network with the groundings that a world violates; the same object if there are none that it lacks."""
     world = world_evidence(lazy.network, truth)
     network = lazy.network
     for template in lazy.templates:
         for piece in violations(lazy.network, world, template, engine=engine):
             network = _with_piece(network, template, piece)
-        if deadline is not None and deadline.is_over:
-            break
     return lazy if network is lazy.network else replace(lazy, network=network)
 
 
