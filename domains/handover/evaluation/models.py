@@ -62,7 +62,7 @@ def lookup(training: Sequence[Row], tests: Sequence[Row], question: Question) ->
 
 
 def _cell(counts: Counter[str] | None, prior: Float, question: Question) -> Float:
-    found = np.array([(counts or {}).get(c, 0) for c in question.classes], dtype=np.float64) + prior
+    found = np.array([(0 if counts is None else counts[c]) for c in question.classes], dtype=np.float64) + prior
     out: Float = found / found.sum()
     return out
 
@@ -116,7 +116,7 @@ def logistic_pairwise(training: Sequence[Row], tests: Sequence[Row], question: Q
 
 
 def predicted(
-    model: ml.Model, prior: object, training: Sequence[Row], tests: Sequence[Row], questions: Sequence[Question]
+    model: ml.Model, prior: float | None, training: Sequence[Row], tests: Sequence[Row], questions: Sequence[Question]
 ) -> dict[str, Float]:
     """Probabilities by a Markov logic model, for each question; equal test rows are asked once.
 

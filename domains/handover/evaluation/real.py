@@ -50,7 +50,7 @@ class HeldOut:
 
     scheme: str
     question: Question
-    truth: np.ndarray  # type: ignore[type-arg]
+    truth: np.ndarray
     groups: tuple[str, ...]
     found: Mapping[str, Float]
     chosen: Mapping[str, int]
@@ -92,10 +92,10 @@ def held_out(
     return _gathered(scheme, REGION, rows, groups, parts), _gathered(scheme, METHOD, rows, groups, parts)
 
 
-_Part = tuple[np.ndarray, dict[tuple[str, str], Float], dict[str, str]]  # type: ignore[type-arg]
+_Part = tuple[np.ndarray, dict[tuple[str, str], Float], dict[str, str]]
 
 
-def _fold(rows: list[Row], groups: Sequence[str], test: np.ndarray) -> _Part:  # type: ignore[type-arg]
+def _fold(rows: list[Row], groups: Sequence[str], test: np.ndarray) -> _Part:
     inside = set(test.tolist())
     training = [i for i in range(len(rows)) if i not in inside]
     halves = [rows[i] for i in training], [rows[i] for i in test]
@@ -125,7 +125,7 @@ def _choose(training: list[Row], groups: Sequence[str]) -> tuple[str, float]:
     return GRID[int(np.argmin(losses))]
 
 
-def _truth(rows: Sequence[Row], question: Question) -> np.ndarray:  # type: ignore[type-arg]
+def _truth(rows: Sequence[Row], question: Question) -> np.ndarray:
     return np.array([question.classes.index(row.label(question.predicate)) for row in rows])
 
 

@@ -42,8 +42,8 @@ def protocol_section(found: Mapping[str, Sequence[Split]]) -> str:
     """The paper's protocol, repeated."""
     n = len(next(iter(found.values())))
     lines = [f"## Unseen objects: the paper's protocol over {n} splits", "",
-             "22 objects train, 10 test; generated instances. Mean over splits and the middle 95 % of them; the paper's "
-             "own ten test objects in a column of their own.", ""]  # fmt: skip
+             "22 objects train, 10 test; generated instances. Mean over splits and the middle 95 % of them; the "
+             "paper's own ten test objects in a column of their own.", ""]  # fmt: skip
     for name, runs in found.items():
         ceiling = 100 * bayes_ceiling(published().counts) if name == "sampled" else 100.0
         lines += [f"### Labels {name}: Bayes ceiling of the method {ceiling:.1f} %", "",
@@ -56,8 +56,8 @@ def protocol_section(found: Mapping[str, Sequence[Split]]) -> str:
 
 
 _PROTOCOL = f"""`pose` and `grasp` compare the cost model's poses for what was predicted with those for the label,
-at 5 mm and 2 degrees: they are right when method and region are. `pose from template` instead takes the mean pose of the shape
-context over the training objects, as the paper does: the optima of different objects of one shape lie tens of degrees
+at 5 mm and 2 degrees: they are right when method and region are. `pose from template` instead takes the mean pose of
+the shape context over the training objects, as the paper does: the optima of different objects of one shape lie tens of degrees
 apart, so a mean is within tolerance of nearly none of them. The roles of parts were written by us with the catalogue in
 view, and the catalogue gives the labels; the table below says what they are worth. The paper's test objects are
 {", ".join(PAPER_TEST)}.
@@ -122,8 +122,8 @@ def real_section(found: Sequence[HeldOut]) -> str:
     """Held-out predictions of the authors' rows."""
     lines = ["## The authors' 429 rows", "",
              "Ten folds; `key` holds out combinations of shape, category and task, `block` whole runs of the file (its "
-             "rows come in copied runs). Missing levels are filled from the next row; material, texture and environment "
-             "are those of the 2019 file. Intervals: 95 %, bootstrap over groups. Differences are paired with ours, "
+             "rows come in copied runs). Missing levels are filled from the next row; material, texture and "
+             "environment are those of the 2019 file. Intervals: 95 %, bootstrap over groups. Differences are paired with ours, "
              "positive where ours is better. For the method, templates and prior of ours were chosen inside each "
              "training half.", ""]  # fmt: skip
     for one in found:
@@ -153,8 +153,8 @@ def _real_line(one: HeldOut, name: str) -> str:
 def cells_section(rows: Sequence[PublishedRow]) -> str:
     """Whether the paper's model is the look-up table on the cells that it saw."""
     same, n = paper_is_lookup(rows)
-    return (f"### The paper's conjunction is a look-up table\n\nTrained on all rows, its most probable pair of region and "
-            f"method is a most frequent one of the cell in {same} of {n} seen cells "
+    return (f"### The paper's conjunction is a look-up table\n\nTrained on all rows, its most probable pair of region "
+            f"and method is a most frequent one of the cell in {same} of {n} seen cells "
             f"({100 * same / n:.1f} %).\n\n")  # fmt: skip
 
 
@@ -197,8 +197,8 @@ def real_ablation(rows: Sequence[PublishedRow]) -> str:
         ("pairs, without looks", read_knowledge("pairs"), 0.3, rows_of(rows, looks=False)),
         *((f"pairs, levels {name}", read_knowledge("pairs"), 0.3, rows_of(rows, levels=name)) for name in LEVELS[1:]),
     ]
-    lines = ["### Ablations", "", "Held-out keys, ten folds, prior of standard deviation 0.3 (1.0 for 2019). Where it is "
-             "not functional, probabilities are scaled to sum to 1.", "",
+    lines = ["### Ablations", "", "Held-out keys, ten folds, prior of standard deviation 0.3 (1.0 for 2019). Where it "
+             "is not functional, probabilities are scaled to sum to 1.", "",
              "| model | region accuracy | log-loss | method accuracy | balanced | log-loss |",
              "|---|---|---|---|---|---|"]  # fmt: skip
     lines += [_ablated(name, model, sd, seen, rows) for name, model, sd, seen in cases]
@@ -207,7 +207,7 @@ def real_ablation(rows: Sequence[PublishedRow]) -> str:
 
 def _ablated(name: str, model: ml.Model, sd: float, seen: Sequence[models.Row], rows: Sequence[PublishedRow]) -> str:
     keys = [" ".join(fact[-1] for fact in known_facts(row, looks=False, level=False)) for row in rows]
-    found: dict[str, np.ndarray] = {q.predicate: np.zeros((len(rows), 3)) for q in (REGION, METHOD)}  # type: ignore[type-arg]
+    found: dict[str, np.ndarray] = {q.predicate: np.zeros((len(rows), 3)) for q in (REGION, METHOD)}
     for test in grouped_folds(keys, [row.method for row in rows]):
         inside = set(test.tolist())
         training = [row for i, row in enumerate(seen) if i not in inside]

@@ -57,7 +57,9 @@ def _draw_body(server: viser.ViserServer, scene: Scene) -> None:
 
 def _draw_moment(server: viser.ViserServer, scene: Scene, run: Run, moment: Moment) -> None:
     points, tool = arm_points(scene, moment.q)
-    server.scene.add_line_segments("/robot", np.stack([points[:-1], points[1:]], axis=1), (68, 84, 106), line_width=9.0)
+    server.scene.add_line_segments(
+        "/robot", np.stack([points[:-1], points[1:]], axis=1), (68, 84, 106), thickness=9.0, thickness_units="screen"
+    )
     if run.plan is not None:
         thing = compose(tool, inverse(run.plan.grasp, "tool"))
         server.scene.add_point_cloud("/object", transform_points(thing, scene.thing.surface.points), (91, 143, 217),

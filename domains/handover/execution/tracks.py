@@ -123,7 +123,8 @@ def at(places: FloatArray, step: float, time: float) -> FloatArray:
     x = min(max(time / step, 0.0), len(places) - 1.0)
     i = min(int(x), len(places) - 2) if len(places) > 1 else 0
     if len(places) == 1:
-        return places[0]
+        only: FloatArray = places[0]
+        return only
     out: FloatArray = places[i] + (x - i) * (places[i + 1] - places[i])
     return out
 

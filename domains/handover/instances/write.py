@@ -11,8 +11,8 @@ from typing import Any
 import mlnlite as ml
 from mlnlite.domains.handover.instances.generate import Instance, facts_of
 from mlnlite.domains.handover.instances.poses import Cell, MeanPose, Placed, cell_of
-from mlnlite.domains.handover.knowledge.facts import databases_text
-from mlnlite.domains.handover.knowledge.words import environments_of, role_of
+from mlnlite.domains.handover.knowledge.facts import databases_text, kept
+from mlnlite.domains.handover.knowledge.words import environments_of, read_knowledge, role_of
 from mlnlite.domains.handover.objects import read_object
 
 _POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
@@ -21,8 +21,9 @@ _OBJECT = ("shape", "category", "material", "texture", "environments", "region_n
 
 
 def write_db(instances: Sequence[Instance], path: Path) -> None:
-    """All facts, one database for each instance."""
-    path.write_text(databases_text(facts_of(instances)), encoding="utf-8")
+    """What the domain's own model has words for, one database for each instance."""
+    known = read_knowledge().predicates
+    path.write_text(databases_text([kept(facts, known) for facts in facts_of(instances)]), encoding="utf-8")
 
 
 def write_rows(instances: Sequence[Instance], placed: Mapping[Cell, Placed], path: Path) -> None:

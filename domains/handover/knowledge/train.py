@@ -13,7 +13,9 @@ PRIOR_SD = 1.0
 """Standard deviation of the weights of the paper's and the 2019 templates."""
 
 
-def train(model: ml.Model, instances: Sequence[Sequence[Fact]], *, prior: object = None) -> ml.LearnedModel:
+def train(
+    model: ml.Model, instances: Sequence[Sequence[Fact]], *, prior: float | ml.Hierarchical | None = None
+) -> ml.LearnedModel:
     """Weights by conditional likelihood of what is asked, given all that is known.
 
     Args:

@@ -61,7 +61,7 @@ def draw_keywords(shares: Sequence[Share], source: str) -> Figure:
     return _bars(series, list(KEYWORDS), "name it plainly [%]", source)
 
 
-def _bars(series: dict[str, np.ndarray], ticks: Sequence[str], label: str, title: str) -> Figure:  # type: ignore[type-arg]
+def _bars(series: dict[str, np.ndarray], ticks: Sequence[str], label: str, title: str) -> Figure:
     figure = Figure(figsize=(8, 3.6))
     axis = figure.subplots()
     width = 0.8 / max(len(series), 1)

@@ -16,7 +16,7 @@ KEYWORDS: Mapping[str, tuple[str, ...]] = {
 """Stems of words: a word counts if it starts with one. The paper names no sets; these are ours."""
 _NEGATIONS = frozenset({"not", "no", "never", "nobody", "without", "cannot", "hardly", "nothing"})
 _WINDOW = 3
-"""A keyword is negated if a negation stands among so many words before it."""
+"""A keyword is negated if a negation stands among so many words before it in its clause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +44,13 @@ def mentions(comment: str) -> dict[str, bool]:
     >>> mentions("It is not dangerous and easy to reach.")
     {'safety': False, 'comfort': True, 'reach': True}
     """
-    words = re.findall(r"[a-z']+", comment.lower())
     found: dict[str, bool] = {}
-    for name, stems in KEYWORDS.items():
-        places = [i for i, word in enumerate(words) if word.startswith(stems)]
-        if places:
-            found[name] = any(not _negated(words, i) for i in places)
-    return found
+    for clause in re.split(r"[.,;:!?]|\bbut\b|\band\b", comment.lower()):
+        words = re.findall(r"[a-z']+", clause)
+        for name, stems in KEYWORDS.items():
+            for i in (i for i, word in enumerate(words) if word.startswith(stems)):
+                found[name] = found.get(name, False) or not _negated(words, i)
+    return {name: found[name] for name in KEYWORDS if name in found}
 
 
 def _negated(words: Sequence[str], place: int) -> bool:
