@@ -57,7 +57,8 @@ def protocol_section(found: Mapping[str, Sequence[Split]]) -> str:
 
 _PROTOCOL = f"""`pose` and `grasp` compare the cost model's poses for what was predicted with those for the label,
 at 5 mm and 2 degrees: they are right when method and region are. `pose from template` instead takes the mean pose of
-the shape context over the training objects, as the paper does: the optima of different objects of one shape lie tens of degrees
+the shape context over the training objects, as the paper does: the optima of different objects of one shape lie tens
+of degrees
 apart, so a mean is within tolerance of nearly none of them. The roles of parts were written by us with the catalogue in
 view, and the catalogue gives the labels; the table below says what they are worth. The paper's test objects are
 {", ".join(PAPER_TEST)}.
@@ -123,7 +124,8 @@ def real_section(found: Sequence[HeldOut]) -> str:
     lines = ["## The authors' 429 rows", "",
              "Ten folds; `key` holds out combinations of shape, category and task, `block` whole runs of the file (its "
              "rows come in copied runs). Missing levels are filled from the next row; material, texture and "
-             "environment are those of the 2019 file. Intervals: 95 %, bootstrap over groups. Differences are paired with ours, "
+             "environment are those of the 2019 file. Intervals: 95 %, bootstrap over groups. Differences are "
+             "paired with ours, "
              "positive where ours is better. For the method, templates and prior of ours were chosen inside each "
              "training half.", ""]  # fmt: skip
     for one in found:
