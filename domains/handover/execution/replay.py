@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +30,8 @@ def record(scene: Scene, run: Run, path: str | Path, *, port: int = 0) -> None:
         path: of the recording.
         port: on which the server runs meanwhile; 0 for any.
     """
-    server = viser.ViserServer(host="127.0.0.1", port=port or 8191, verbose=False)
+    with redirect_stdout(StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=port or 8191, verbose=False)
     try:
         server.scene.set_up_direction("+z")
         _draw_body(server, scene)
