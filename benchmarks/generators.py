@@ -24,12 +24,19 @@ Cancer(person)
 
 RIVALS = """*Friends(person, person)
 *Rivals(person, person)
+*Habit(person, level)
 Smokes(person)
-*Likes(person)
-0.9 Friends(x, y) => (Smokes(x) <=> Smokes(y))
-1.1 Rivals(x, y) => !(Smokes(x) <=> Smokes(y))
-0.7 Likes(x) => Smokes(x)
--0.3 Smokes(x)
+Cancer(person)
+0.9 Friends(x, y) ^ Smokes(x) => Smokes(y)
+1.1 Rivals(x, y) => !(Smokes(x) ^ Smokes(y))
+1.7 Habit(x, A) => Smokes(x)
+0.9 Habit(x, B) => Smokes(x)
+0.4 Habit(x, C) => Smokes(x)
+-0.3 Habit(x, D) ^ Smokes(x)
+-0.8 Habit(x, E) ^ Smokes(x)
+-1.6 Habit(x, F) ^ Smokes(x)
+0.8 Smokes(x) => Cancer(x)
+-0.5 Cancer(x)
 """
 
 
@@ -69,16 +76,16 @@ def smokers(n_people: int, n_friends: int = 10, seed: int = 0) -> tuple[Model, E
     return model, evidence_of(model, {"person": n_people}, facts)
 
 
-def rivals(n_people: int = 1000, degree: float = 4.0, share: float = 0.3, seed: int = 0) -> tuple[Model, Evidence]:
-    """Frustrated: a share of the edges makes people differ. `n_people` atoms of that mean degree."""
+def rivals(n_people: int = 500, degree: float = 6.0, share: float = 0.3, seed: int = 0) -> tuple[Model, Evidence]:
+    """Frustrated: friends pull a person into smoking, rivals out of it. `2 n_people` atoms."""
     rng = np.random.default_rng(seed)
     pairs = rng.integers(0, n_people, (int(n_people * degree / 2), 2))
-    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     rival = rng.random(len(pairs)) < share
     facts = {
         "Friends": pairs[~rival],
         "Rivals": pairs[rival],
-        "Likes": np.arange(n_people)[rng.random(n_people) < 0.4][:, None],
+        "Habit": np.stack([np.arange(n_people), rng.integers(0, 6, n_people)], axis=1),
     }
     model = ml.model_from_text(RIVALS)
     return model, evidence_of(model, {"person": n_people}, facts)
@@ -106,3 +113,41 @@ def entities(n: int = 100, noise: float = 0.05, hard: bool = True, seed: int = 0
     )
     facts = {"Similar": np.concatenate([np.argwhere(seen), np.stack([np.arange(n)] * 2, axis=1)])}
     return model, evidence_of(model, {"record": n}, facts)
+
+
+def regions(n_objects: int = 32, n_regions: int = 6, share: float = 0.3, seed: int = 0) -> tuple[Model, Evidence]:
+    """One region for each object; near objects want different regions, and some triples must not stand in a row."""
+    rng = np.random.default_rng(seed)
+    pairs = np.argwhere(np.triu(rng.random((n_objects, n_objects)) < share, 1))
+    triples = np.array([rng.choice(n_objects, 3, replace=False) for _ in range(int(share * 4 * n_objects))])
+    model = ml.model_from_text(
+        "*Near(object, object)\n*Row(object, object, object)\n*Fits(object, region)\nAt(object, region!)\n"
+        "1.2 Near(x, y) ^ At(x, r) => !At(y, r)\n"
+        "2.0 Row(x, y, z) ^ At(x, r) ^ At(y, r) => At(z, r)\n"
+        "0.9 Fits(x, r) => At(x, r)\n"
+    )
+    facts = {"Near": pairs, "Row": triples, "Fits": np.argwhere(rng.random((n_objects, n_regions)) < 0.4)}
+    return model, evidence_of(model, {"object": n_objects, "region": n_regions}, facts)
+
+
+def items(n_items: int = 1000, n_classes: int = 10, n_references: int = 3, seed: int = 0) -> tuple[Model, Evidence]:
+    """One class for each item; items tend to share the class of those that they refer to, and words hint at classes."""
+    rng = np.random.default_rng(seed)
+    model = ml.model_from_text(
+        "*Refers(item, item)\n*Hint(item, class)\nClass(item, class!)\n"
+        "1.0 Refers(x, y) ^ Class(x, c) => Class(y, c)\n"
+        "0.8 Hint(x, c) => Class(x, c)\n"
+    )
+    truth = rng.integers(0, n_classes, n_items)
+    noisy = np.where(rng.random(n_items) < 0.3, rng.integers(0, n_classes, n_items), truth)
+    pairs = rng.integers(0, n_items, (n_items * n_references, 2))
+    facts = {
+        "Refers": pairs[pairs[:, 0] != pairs[:, 1]],
+        "Hint": np.concatenate(
+            [
+                np.stack([np.arange(n_items), noisy], axis=1),
+                np.stack([np.arange(n_items), rng.integers(0, n_classes, n_items)], axis=1),
+            ]
+        ),
+    }
+    return model, evidence_of(model, {"item": n_items, "class": n_classes}, facts)

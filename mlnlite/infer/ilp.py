@@ -9,7 +9,7 @@ Riedel (UAI 2008) and Noessner, Niepert and Stuckenschmidt (AAAI 2013) solve the
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import highspy
 import numpy as np
@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from mlnlite.ground.network import Bool, Float, Int64
 from mlnlite.infer.conjunctions import Cells
+from mlnlite.infer.costs import with_costs
 from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.parts import Part, PartAnswer, all_gains
 
@@ -69,6 +70,7 @@ def solve_part(
         gap: stop when no world can be better than this share of the cost of the best one.
         start: shape (n,), a world to start from.
     """
+    part, constant = with_costs(part)
     program, columns = program_of(part)
     solver = highspy.Highs()  # type: ignore[no-untyped-call]
     options = {"output_flag": False, "random_seed": seed, "threads": 1, "mip_rel_gap": gap, "mip_abs_gap": _ABSOLUTE}
@@ -81,7 +83,8 @@ def solve_part(
         _start(solver, columns, start)
     stop_with(solver, deadline)
     solver.run()
-    return _answer(solver, columns, part)
+    answer = _answer(solver, columns, part)
+    return replace(answer, bound=answer.bound + constant)
 
 
 def stop_with(solver: highspy.Highs, deadline: Deadline) -> None:

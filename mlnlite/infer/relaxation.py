@@ -20,7 +20,7 @@ _CLOSE = 1e-7
 FOREVER = Deadline()
 
 
-def solve_part(part: Part, deadline: Deadline = FOREVER, solver_name: str = "ipm") -> PartAnswer:
+def solve_part(part: Part, deadline: Deadline = FOREVER, solver_name: str = "pdlp") -> PartAnswer:
     """Solves the linear relaxation of a component.
 
     Args:

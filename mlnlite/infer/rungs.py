@@ -113,8 +113,9 @@ def _ladder(part: Part, options: Options, ask: Ask) -> list[tuple[Rung, float]]:
     mixed = (part.cardinality > 2).any() or max((c.scope.shape[1] for c in part.cells), default=0) == 3
     if len(part.variables) <= _FEW and mixed:
         return [*steps, *tried, (by_annealing, inf), (by_ilp, inf)]
-    relaxed: list[tuple[Rung, float]] = [(_by_relaxation, 4 * _FIRST_TRY)] if n_cells > _MANY else []
-    return [*steps, *relaxed, (by_ilp, _FIRST_TRY), *tried, (by_annealing, inf), (by_ilp, inf)]
+    relaxed: list[tuple[Rung, float]] = [(_by_relaxation, 2 * _FIRST_TRY)] if n_cells > _MANY else []
+    first = tried if mixed else [(by_ilp, _FIRST_TRY), *tried]
+    return [*steps, *relaxed, *first, (by_annealing, inf), (by_ilp, inf)]
 
 
 def _single(options: Options, ask: Ask) -> dict[str, list[tuple[Rung, float]]]:
