@@ -129,7 +129,8 @@ def real_section(found: Sequence[HeldOut]) -> str:
              "positive where ours is better. For the method, templates and prior of ours were chosen inside each "
              "training half; the grid of that choice was laid out after a look "
              "at cross-validations of these very rows. So was the decision for the hierarchical prior of the region: "
-             "chosen from the grid as the method's, its accuracy on held-out keys was 46.2 % (log-loss 0.988).", ""]  # fmt: skip
+             "chosen from the grid as the method's, its accuracy on held-out keys was 46.2 % "
+             "(log-loss 0.988).", ""]  # fmt: skip
     for one in found:
         chosen = ", ".join(f"{name} ({n})" for name, n in sorted(one.chosen.items(), key=lambda pair: -pair[1]))
         lines += [f"### {one.question.predicate}, {one.scheme}", "", f"Chosen: {chosen}.", "",
