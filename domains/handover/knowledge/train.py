@@ -9,9 +9,6 @@ import mlnlite as ml
 from mlnlite.domains.handover.knowledge.facts import Fact, gathered_text, kept
 from mlnlite.domains.handover.knowledge.words import asked_predicates
 
-PRIOR_SD = 1.0
-"""Standard deviation of the weights of the paper's and the 2019 templates."""
-
 
 def train(
     model: ml.Model, instances: Sequence[Sequence[Fact]], *, prior: float | ml.Hierarchical | None = None
