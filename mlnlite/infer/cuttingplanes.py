@@ -29,7 +29,7 @@ from mlnlite.model.model import Model
 from mlnlite.model.propositional import cubes, without_quantifiers
 from mlnlite.model.templates import Template
 
-LAZY_FROM = 300_000
+LAZY_FROM = 500_000
 """Groundings of a formula that are worth waiting for."""
 
 _CLOSE = 1e-4
@@ -73,9 +73,13 @@ def worth_waiting(model: Model, evidence: Evidence, least: int = LAZY_FROM) -> t
 
 
 def _can_wait(template: Template, evidence: Evidence) -> bool:
-    """Whether every grounding is a clause that worlds are better off satisfying."""
+    """Whether every grounding is a clause that worlds are better off satisfying, over three unknown atoms or more.
+
+    (Pairs of atoms that exclude each other become counts, which are worth having from the start.)
+    """
+    still_open = [a for a in template.formula.atoms if not evidence.predicates[a.predicate].closed]
     constants = {name: np.flatnonzero(p.any(axis=0)).tolist() for name, p in evidence.present.items()}
-    if not (template.weights > 0).all() or len(template.formula.free) < 2:
+    if not (template.weights > 0).all() or len(template.formula.free) < 2 or len(still_open) < 3:
         return False
     body = without_quantifiers(template.formula, constants).body
     false = cubes(body, False)
