@@ -129,7 +129,7 @@ def _weighted(templates: list[Template], type_name: str, unary: tuple[str, ...],
 
     own, pair = np.zeros(len(cells)), np.zeros((len(cells), len(cells), len(shared)))
     for t in templates:
-        weight, free = float(t.weights[0]), t.formula.free
+        weight, free = float(t.weights.sum()), t.formula.free
         own += _gain(weight, _truth(t.formula, t.formula.body, dict.fromkeys(free, 0), alone))
         if len(free) == 2:
             for first in (0, 1):
