@@ -29,7 +29,7 @@ def solve_part(part: Part, ask: Ask, deadline: Deadline) -> PartAnswer:
         deadline: when to give up; RC2 has no world before it is done.
     """
     problem, scale, error = _problem(part)
-    reply = ask("_rc2_worker", problem, deadline.left)
+    reply = ask("_rc2_worker", problem, deadline)
     if reply is None or reply["state"] is None:
         return PartAnswer(None, all_gains(part), False, MAXSAT)
     first = np.cumsum(part.cardinality, dtype=np.int64) - part.cardinality

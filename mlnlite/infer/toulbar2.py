@@ -21,6 +21,7 @@ from mlnlite.infer.workers import Ask
 WCSP = "wcsp"
 _LARGEST_COST = 2.0**50
 _FINEST = 9
+_LONGEST = 10**6
 
 
 def is_available() -> bool:
@@ -44,8 +45,8 @@ def solve_part(part: Part, ask: Ask, deadline: Deadline, seed: int = 0) -> PartA
         raise MissingPart("toulbar2 is not installed", hint="pip install pytoulbar2 (not made for Windows)")
     problem, scale, rounding = _problem(part)
     left = deadline.left
-    problem |= {"seconds": max(1, int(left)) if np.isfinite(left) else 0, "seed": seed + 1}
-    reply = ask("_toulbar2_worker", problem, left) or {"state": None, "bound": None, "optimal": False}
+    problem |= {"seconds": max(1, int(min(left, _LONGEST))), "seed": seed + 1}
+    reply = ask("_toulbar2_worker", problem, deadline) or {"state": None, "bound": None, "optimal": False}
     world = None if reply["state"] is None else np.array(reply["state"], np.int64)
     bound = np.inf if reply["bound"] is None else -reply["bound"] / scale + rounding
     return PartAnswer(world, bound, bool(reply["optimal"]), WCSP)

@@ -12,13 +12,15 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Timer
+from threading import Event, Thread
 from typing import Any, TypeAlias
 
-_GRACE = 5.0
+from mlnlite.infer.deadline import Deadline
 
-Ask: TypeAlias = Callable[[str, dict[str, Any], float], dict[str, Any] | None]
-"""Asks a worker, by the name of its file: a problem and how many seconds it may take. None if it had to be ended."""
+_GRACE, _TICK = 3.0, 0.2
+
+Ask: TypeAlias = Callable[[str, dict[str, Any], Deadline], dict[str, Any] | None]
+"""Asks a worker, by the name of its file: a problem, and when to stop. None if it had to be ended."""
 
 
 @contextmanager
@@ -26,12 +28,12 @@ def workers() -> Iterator[Ask]:
     """Workers that start when they are first asked and are ended with the block."""
     running: dict[str, subprocess.Popen[str]] = {}
 
-    def ask(name: str, problem: dict[str, Any], seconds: float) -> dict[str, Any] | None:
+    def ask(name: str, problem: dict[str, Any], deadline: Deadline) -> dict[str, Any] | None:
         process = running.get(name)
         if process is None or process.poll() is not None:
             _end(process)
             process = running[name] = _started(name)
-        return _asked(process, problem, seconds)
+        return _asked(process, problem, deadline)
 
     try:
         yield ask
@@ -59,12 +61,12 @@ def _started(name: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True, env=environment)
 
 
-def _asked(process: subprocess.Popen[str], problem: dict[str, Any], seconds: float) -> dict[str, Any] | None:
+def _asked(process: subprocess.Popen[str], problem: dict[str, Any], deadline: Deadline) -> dict[str, Any] | None:
     """The answer to a problem; the worker is ended if it takes much longer than it may."""
     assert process.stdin is not None
     assert process.stdout is not None
-    timer = Timer(min(seconds, 1e6) + _GRACE, process.kill)
-    timer.start()
+    done = Event()
+    Thread(target=_watch, args=(process, deadline, done), daemon=True).start()
     try:
         process.stdin.write(json.dumps(problem) + "\n")
         process.stdin.flush()
@@ -72,6 +74,15 @@ def _asked(process: subprocess.Popen[str], problem: dict[str, Any], seconds: flo
     except BrokenPipeError:
         line = ""
     finally:
-        timer.cancel()
+        done.set()
     answer: dict[str, Any] | None = json.loads(line) if line else None
     return answer
+
+
+def _watch(process: subprocess.Popen[str], deadline: Deadline, done: Event) -> None:
+    """Ends a worker that does not stop by itself."""
+    while not done.wait(_TICK):
+        if deadline.is_over:
+            if not done.wait(_GRACE):
+                process.kill()
+            return
