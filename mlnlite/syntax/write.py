@@ -201,7 +201,8 @@ def _number(value: float) -> str:
 
 def _operand(weight: tree.WeightExpression) -> str:
     text = write_weight(weight)
-    return f"({text})" if isinstance(weight, tree.Arithmetic) or text.startswith("-") else text
+    bare = not isinstance(weight, tree.Arithmetic) and not text.startswith("-") and text != "inf"
+    return text if bare else f"({text})"
 
 
 # --- statements

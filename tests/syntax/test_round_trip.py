@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from mlnlite.source import Source
@@ -65,6 +65,7 @@ def test_written_formulas_read_the_same_in_both_dialects(formula):
 
 @settings(max_examples=60, deadline=None)
 @given(weight=weights)
+@example(weight=tree.Arithmetic("-", tree.Number(float("inf")), tree.Call("log", (tree.Number(0.0),))))
 def test_weight(weight):
     program = read(f"{write_weight(weight)} P(x)")
     assert program.statements == (tree.FormulaStatement(tree.Atom("P", (tree.Variable("x"),)), weight),)
