@@ -54,6 +54,13 @@ def folder(tmp_path):
 # --- check
 
 
+@pytest.mark.parametrize("command", [["check"], ["query", "-q", "Cancer"], ["ground"], ["evaluate"]])
+def test_facts_in_the_place_of_a_model_are_refused(folder, command):
+    result = run(*command, folder / "m.mln", folder / "e.db")
+    assert result.exit_code == 2
+    assert "e.db`" in result.output.replace("\n", "") and "write `-e " in result.output
+
+
 def test_check_counts(folder):
     text = answer("check", folder / "m.mln", "-e", folder / "e.db").stdout
     assert re.search(r"years +2 +Old, Young", text)

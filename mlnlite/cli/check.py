@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
-from mlnlite.cli.options import APART, FILE, dialect_option, evidence_option, format_option
+from mlnlite.cli.options import APART, dialect_option, evidence_option, format_option, models_argument
 from mlnlite.cli.terminal import shortened, table, working
 from mlnlite.errors import Diagnostic
 
@@ -31,7 +31,7 @@ class _Options(TypedDict):
 
 
 @click.command()
-@click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...")
+@models_argument
 @evidence_option(APART)
 @dialect_option
 @format_option("text", "json")

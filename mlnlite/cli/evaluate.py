@@ -9,12 +9,12 @@ import click
 
 from mlnlite.cli.files import emit
 from mlnlite.cli.options import (
-    FILE,
     TOGETHER,
     closed_world_option,
     dialect_option,
     evidence_option,
     format_option,
+    models_argument,
     names,
     open_world_option,
     output_option,
@@ -39,7 +39,7 @@ class _Options(TypedDict):
 
 
 @click.command()
-@click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...")
+@models_argument
 @evidence_option(TOGETHER)
 @click.option(
     "-q", "--query", multiple=True, required=True, metavar="NAMES", help="Predicates whose facts are the labels."

@@ -18,6 +18,7 @@ from mlnlite.cli.options import (
     dialect_option,
     evidence_option,
     format_option,
+    models_argument,
     names,
     open_world_option,
     output_option,
@@ -65,7 +66,7 @@ def _all_writable(_: click.Context, __: click.Parameter, value: tuple[Path, ...]
 
 
 @click.command()
-@click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...")
+@models_argument
 @evidence_option(TOGETHER)
 @closed_world_option
 @open_world_option

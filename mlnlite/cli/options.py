@@ -57,6 +57,17 @@ TOGETHER = "Facts that are known: .db files, NAME=TABLE (CSV, Parquet, ...), .to
 APART = "Facts that are known: .db files, each database a world of its own; NAME=TABLE and .toml mappings, one world."
 
 
+def _no_facts(_: click.Context, __: click.Parameter, value: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Facts in the place of a model would be read as formulas of weight 1."""
+    facts = next((path for path in value if path.suffix == ".db"), None)
+    if facts is not None:
+        raise click.UsageError(f"{facts} is named as a model and holds facts by its name; write `-e {facts}`")
+    return value
+
+
+models_argument = click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...", callback=_no_facts)
+
+
 def evidence_option(text: str) -> Callable[[Command], Command]:
     """`-e`, with what several files mean."""
     return click.option("-e", "--evidence", type=FILE, multiple=True, metavar="FILE", help=text)

@@ -15,6 +15,7 @@ from mlnlite.cli.options import (
     dialect_option,
     evidence_option,
     format_option,
+    models_argument,
     output_option,
 )
 from mlnlite.cli.terminal import working
@@ -35,7 +36,7 @@ class _Options(TypedDict):
 
 
 @click.command()
-@click.argument("models", type=FILE, nargs=-1, required=True, metavar="MODEL...")
+@models_argument
 @evidence_option(TOGETHER)
 @click.option("--world", type=FILE, required=True, metavar="FILE", help="A .db file with the atoms that are true.")
 @database_option
