@@ -54,6 +54,13 @@ def folder(tmp_path):
 # --- check
 
 
+def test_mistakes_of_syntax_and_of_meaning_are_told_together(folder):
+    text = "Smokes(person)\nCancer(person, \n2 Smokess(x)\n1 Cancer(x)\n!Smokes(Ann, Bob).\n"
+    (folder / "m.mln").write_text(text)
+    found = json.loads(run("check", folder / "m.mln", "--format", "json").output)
+    assert [(d["code"], d["line"]) for d in found["diagnostics"]] == [("E103", 2), ("E202", 3), ("E203", 5)]
+
+
 @pytest.mark.parametrize("command", [["check"], ["query", "-q", "Cancer"], ["ground"], ["evaluate"]])
 def test_facts_in_the_place_of_a_model_are_refused(folder, command):
     result = run(*command, folder / "m.mln", folder / "e.db")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike, fspath
@@ -10,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean
+from mlnlite.errors import Diagnostic, EvidenceMistake, ModelMistake, SyntaxMistake, did_you_mean, in_order
 from mlnlite.model.check import check
 from mlnlite.model.evidence import Evidence, Facts
 from mlnlite.model.facts import TableFacts, check_evidence
@@ -20,8 +21,8 @@ from mlnlite.model.table import Table, read_mapping
 from mlnlite.source import Source
 from mlnlite.syntax.evidence import parse_evidence
 from mlnlite.syntax.files import read_source
-from mlnlite.syntax.parse import parse_model
-from mlnlite.syntax.tree import AnyDialect, EvidenceProgram
+from mlnlite.syntax.parse import parse_what_can_be_read
+from mlnlite.syntax.tree import AnyDialect, EvidenceProgram, Program
 
 Path: TypeAlias = str | PathLike[str]
 
@@ -37,12 +38,38 @@ def read_model(*paths: Path, dialect: AnyDialect | None = None) -> Model:
         SyntaxMistake: if the text is not in the language; with every mistake.
         ModelMistake: if it is, but makes no model; with every mistake.
     """
-    return check(parse_model([read_source(path) for path in paths], dialect))
+    return _model([read_source(path) for path in paths], dialect)
 
 
 def model_from_text(text: str, *, dialect: AnyDialect | None = None) -> Model:
     """The model that a text means. Raises as `read_model`."""
-    return check(parse_model([Source("<text>", text)], dialect))
+    return _model([Source("<text>", text)], dialect)
+
+
+def _model(sources: Sequence[Source], dialect: AnyDialect | None) -> Model:
+    program, mistakes = parse_what_can_be_read(sources, dialect)
+    if mistakes:
+        raise SyntaxMistake(in_order([*mistakes, *_also_wrong(program, mistakes)]))
+    return check(program)
+
+
+def _also_wrong(program: Program, mistakes: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """What is wrong with the statements that could be read; not what one that could not may declare."""
+    unread = {word for d in mistakes if d.span for word in _words(d.span.source.line(d.span.line))}
+    try:
+        check(program)
+    except ModelMistake as error:
+        undeclared = {"E200", "E202"}
+        return [
+            d
+            for d in error.diagnostics
+            if d.code not in undeclared or (d.span and unread.isdisjoint(_words(d.span.text)))
+        ]
+    return []
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"[^\W\d]\w*", text))
 
 
 def read_evidence(*paths: Path, model: Model, together: bool = False) -> Evidence:

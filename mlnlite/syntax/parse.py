@@ -65,6 +65,16 @@ def parse_model(sources: Sequence[Source], dialect: AnyDialect | None = None) ->
     Raises:
         SyntaxMistake: with every mistake in every file.
     """
+    program, mistakes = parse_what_can_be_read(sources, dialect)
+    if mistakes:
+        raise SyntaxMistake(mistakes)
+    return program
+
+
+def parse_what_can_be_read(
+    sources: Sequence[Source], dialect: AnyDialect | None = None
+) -> tuple[Program, list[Diagnostic]]:
+    """As `parse_model`, with the mistakes beside the program, which lacks the statements that they stand in."""
     files = [load(source) for source in sources]
     codes = [code for file in files for code in file.codes()]
     marked = first_marked(codes)
@@ -73,14 +83,13 @@ def parse_model(sources: Sequence[Source], dialect: AnyDialect | None = None) ->
     reading = _Reading(found, check)
     reading.mistakes += [diagnostic for file in files for diagnostic in file.mistakes]
     if dialect == "standard" and marked:
-        raise SyntaxMistake([*reading.mistakes, wrong_dialect(marked)])
+        return Program((), "standard"), [*reading.mistakes, wrong_dialect(marked)]
     statements = _read_files(files, reading)
     if reading.dialect == "standard":
         reading.mistakes += constants_as_variables(statements)
-    if reading.mistakes:
-        raise SyntaxMistake(_in_order(reading.mistakes))
     span = Span(sources[0], 0, len(sources[0].text)) if sources else None
-    return Program(statements, _written(found), span, Origin(found, reasons, NOTES[found]))
+    origin = Origin(found, reasons, NOTES[found])
+    return Program(statements, _written(found), span, origin), _in_order(reading.mistakes)
 
 
 def _why(marked: Span) -> str:
