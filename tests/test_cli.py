@@ -65,7 +65,8 @@ def test_mistakes_of_syntax_and_of_meaning_are_told_together(folder):
 def test_facts_in_the_place_of_a_model_are_refused(folder, command):
     result = run(*command, folder / "m.mln", folder / "e.db")
     assert result.exit_code == 2
-    assert "e.db`" in result.output.replace("\n", "") and "write `-e " in result.output
+    assert "e.db`" in result.output.replace("\n", "")
+    assert "write `-e " in result.output
 
 
 def test_check_counts(folder):
