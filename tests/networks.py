@@ -7,19 +7,20 @@ from itertools import product
 import numpy as np
 from hypothesis import strategies as st
 
-from mlnlite.ground.network import Clauses, Network, Tables
+from mlnlite.ground.network import Clauses, Counts, Network, Tables
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import Any, AtomRef, Formula
 from mlnlite.model.model import Model
 from mlnlite.model.templates import Template
 
 
-def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undecided_false=None):
+def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undecided_false=None, counts=()):
     """A network whose atoms have no meaning.
 
     blocks: for each variable ("", 1), ("!", number of atoms) or ("?", number of atoms).
     clauses: (list of (literals, weight index, count), negated), literals of equal length.
     tables: (truth, list of (atoms, weight index, count)).
+    counts: (true groundings for each count, list of (literals, weight index, count)).
     """
     variable, value, cardinality, is_block = [], [], [], []
     for v, (marker, n) in enumerate(blocks):
@@ -36,10 +37,16 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
         Tables(np.array([r[0] for r in rows], np.int32).reshape(len(rows), -1), np.array(truth, bool), *_columns(rows))
         for truth, rows in tables
     ]
+    count_blocks = [
+        Counts(np.array([sorted(r[0], key=abs) for r in rows], np.int32), np.array(true, np.int64), *_columns(rows))
+        for true, rows in counts
+    ]
     decided = np.zeros(n_weights, np.int64) if decided_true is None else np.array(decided_true, np.int64)
     total = decided + (0 if undecided_false is None else np.array(undecided_false, np.int64))
     for b in (*clause_blocks, *table_blocks):
         np.add.at(total, b.weight, b.count)
+    for b in count_blocks:
+        np.add.at(total, b.weight, b.count * b.true.max())
     templates = tuple(
         Template(
             f"formula {i + 1}", Formula((), (), Any((AtomRef(0),))), (), None, np.array([w], float), text=f"f{i + 1}"
@@ -50,7 +57,7 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
         Model({}, {}, templates), Evidence({}, {}, {}, {}), np.arange(len(variable), dtype=np.int64),
         np.array(variable, np.int32), np.array(value, np.int32), np.array(cardinality, np.int32),
         np.array(is_block, bool), tuple(clause_blocks), tuple(table_blocks), np.array(weights, float),
-        np.arange(n_weights, dtype=np.int32), decided, total,
+        np.arange(n_weights, dtype=np.int32), decided, total, tuple(count_blocks),
     )  # fmt: skip
 
 
@@ -74,6 +81,9 @@ def world_counts(net, truth):
     for t in net.tables:
         for atoms, w, n in zip(t.atoms.tolist(), t.weight, t.count, strict=True):
             counts[w] += n * bool(t.truth[tuple(int(truth[a]) for a in atoms)])
+    for c in net.counts:
+        for literals, w, n in zip(c.literals.tolist(), c.weight, c.count, strict=True):
+            counts[w] += n * c.true[sum(bool(truth[abs(x) - 1]) == (x > 0) for x in literals)]
     return counts
 
 
@@ -87,8 +97,8 @@ def world_weight(net, truth):
 
 
 @st.composite
-def networks(draw, max_atoms=10, hard=True):
-    """Random networks with blocks, clauses, conjunctions, tables, zero, negative and hard weights."""
+def networks(draw, max_atoms=10, hard=True, with_counts=True):
+    """Random networks with blocks, clauses, conjunctions, tables, counting factors, zero, negative and hard weights."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     blocks, n = [], 0
     target = draw(st.integers(1, max_atoms))
@@ -110,8 +120,13 @@ def networks(draw, max_atoms=10, hard=True):
         k = min(int(rng.integers(1, 4)), n)
         truth = rng.random((2,) * k) < 0.5
         tables.append((truth, [_row(rng, n, k, weights, signed=False) for _ in range(rng.integers(1, 3))]))
+    counts = []
+    for _ in range(rng.integers(0, 3) if with_counts else 0):
+        k = min(int(rng.integers(1, 7)), n)
+        true = rng.choice([rng.integers(0, 2, k + 1), rng.integers(0, 4, k + 1), np.arange(k + 1)]) + (0 if k else 1)
+        counts.append((true, [_row(rng, n, k, weights, signed=True) for _ in range(rng.integers(1, 3))]))
     decided = rng.integers(0, 3, len(weights))
-    return network(blocks, clauses, tables, weights, decided)
+    return network(blocks, clauses, tables, weights, decided, counts=counts)
 
 
 def _row(rng, n, k, weights, signed):

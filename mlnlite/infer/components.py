@@ -20,11 +20,13 @@ class Component:
         variables: its variables, rising.
         clauses: for each block of `Network.clauses`, the rows that belong to it, rising.
         tables: for each block of `Network.tables`, the rows that belong to it, rising.
+        counts: for each block of `Network.counts`, the rows that belong to it, rising.
     """
 
     variables: Int64
     clauses: tuple[Int64, ...]
     tables: tuple[Int64, ...]
+    counts: tuple[Int64, ...]
 
 
 def labels_of(n_variables: int, scopes: Iterable[Int32]) -> Int32:
@@ -89,6 +91,7 @@ def components_of(network: Network) -> tuple[Component, ...]:
     """
     scopes = [network.variable[np.abs(c.literals) - 1] for c in network.clauses]
     scopes += [network.variable[t.atoms] for t in network.tables]
+    scopes += [network.variable[np.abs(c.literals) - 1] for c in network.counts]
     labels = labels_of(network.n_variables, scopes)
     n = int(labels.max(initial=-1)) + 1
     variables, starts = rows_by_label(labels, n)
@@ -96,6 +99,7 @@ def components_of(network: Network) -> tuple[Component, ...]:
     parts = []
     for i in range(n):
         rows = [order[begin[i] : begin[i + 1]] for order, begin in blocks]
-        split = len(network.clauses)
-        parts.append(Component(variables[starts[i] : starts[i + 1]], tuple(rows[:split]), tuple(rows[split:])))
+        first, last = len(network.clauses), len(network.clauses) + len(network.tables)
+        split = tuple(rows[:first]), tuple(rows[first:last]), tuple(rows[last:])
+        parts.append(Component(variables[starts[i] : starts[i + 1]], *split))
     return tuple(parts)

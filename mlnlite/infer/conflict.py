@@ -10,6 +10,7 @@ from pysat.solvers import Solver
 
 from mlnlite.errors import Contradiction, Diagnostic
 from mlnlite.ground.network import Network
+from mlnlite.infer.counting import count_clauses
 from mlnlite.infer.potentials import decided_false
 
 
@@ -42,7 +43,7 @@ def _core(network: Network) -> list[int]:
     with Solver(name="cadical153") as solver:
         for literals in block_clauses(network):
             solver.add_clause(literals)
-        for weight, literals in hard_clauses(network):
+        for weight, literals in hard_clauses(network, first + len(network.weights)):
             solver.add_clause([-(first + weight), *literals])
         core = np.flatnonzero(np.isposinf(network.weights)) + first
         if solver.solve(assumptions=core.tolist()):
@@ -66,8 +67,13 @@ def block_clauses(network: Network) -> Iterator[list[int]]:
         yield from ([-a, -b] for a, b in combinations(atoms, 2))
 
 
-def hard_clauses(network: Network) -> Iterator[tuple[int, list[int]]]:
-    """Clauses of the hard groundings, each with its weight."""
+def hard_clauses(network: Network, free: int) -> Iterator[tuple[int, list[int]]]:
+    """Clauses of the hard groundings, each with its weight.
+
+    Args:
+        network: of the formulas.
+        free: number of the first variable that may stand for partial counts; atom a is variable a + 1.
+    """
     hard = np.isposinf(network.weights)
     for block in network.clauses:
         rows = hard[block.weight]
@@ -81,3 +87,4 @@ def hard_clauses(network: Network) -> Iterator[tuple[int, list[int]]]:
         signs = 1 - 2 * np.argwhere(~table.truth)
         for weight, atoms in zip(table.weight[rows].tolist(), table.atoms[rows], strict=True):
             yield from ((weight, literals) for literals in ((atoms + 1) * signs).tolist())
+    yield from count_clauses(network, free)

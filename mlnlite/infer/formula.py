@@ -66,11 +66,12 @@ def formula_probabilities(network: Network, formulas: Sequence[Expression], *, w
     """
     definitions = Definitions(network)
     literals = [define(definitions, f) for f in formulas]
-    potentials = potentials_of(network, _conjunctions(definitions.forbidden), definitions.n_auxiliary)
+    extra = _conjunctions(definitions.forbidden)
+    potentials = potentials_of(network, extra, definitions.n_auxiliary, chained=True)
     wanted = np.zeros(len(potentials.cardinality), np.bool_)
     wanted[[x.variable for x in literals if isinstance(x, Literal)]] = True
     found = distributions_of(potentials, wanted, wanted, width_limit)
-    if np.isneginf(potentials.constant) or np.isneginf(found.log_z).any():
+    if np.isneginf(found.constant) or np.isneginf(found.log_z).any():
         raise contradiction(network)
     if found.wide and len(formulas) == 1:
         raise limit_reached(network, found.wide, width_limit)

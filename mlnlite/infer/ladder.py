@@ -81,12 +81,7 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
         everything = np.ones(network.n_variables, np.bool_)
         _enter_sample(network, solution, everything, (atoms, formulas, np.arange(len(solution.methods))), approach)
         return solution
-    found = marginals_of(
-        network,
-        None if len(asked) == network.n_atoms else asked,
-        width_limit=approach.width_limit,
-        too_wide="raise" if approach.method == "exact" else "leave",
-    )
+    network, found = _exactly(network, None if len(asked) == network.n_atoms else asked, approach)
     solution.log_z, solution.largest_table = found.log_z, found.largest_table
     solution.n_components = found.n_components
     _enter_exact(solution, np.arange(len(atoms)), found.probability[atoms], [found.method[a] for a in atoms.tolist()])
@@ -99,6 +94,21 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
         limited = replace(approach, time_limit=deadline.left / (len(jobs) - i))
         _enter_sample(network, solution, variables, (atoms, formulas, rows), limited)
     return solution
+
+
+def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple[Network, AtomProbabilities]:
+    """Elimination; where that is too wide, once more with pairs that are complete as counts."""
+    limit, refuses = approach.width_limit, approach.method == "exact"
+    found = marginals_of(network, asked, width_limit=limit, too_wide="leave")
+    if found.wide:
+        from mlnlite.ground.patterns import with_counts
+
+        counted = with_counts(network)
+        better = len(counted.counts) > len(network.counts)
+        if better or refuses:
+            network = counted if better else network
+            found = marginals_of(network, asked, width_limit=limit, too_wide="raise" if refuses else "leave")
+    return network, found
 
 
 def _n_rows(job: tuple[Int64, Int64]) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -11,10 +12,11 @@ from mlnlite.errors import LimitReached
 from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.elimination import log_sum
+from mlnlite.infer.fold import fold, unfold
 from mlnlite.infer.order import TooWide, plan
 from mlnlite.infer.parts import Batch, Division, Part, batches, divide, parts
 from mlnlite.infer.peel import (
-    Leaves,
+    Gone,
     changed_by,
     peel,
     put_back_distributions,
@@ -66,6 +68,7 @@ class Distributions:
             components unused).
         log_z: shape (n_components,), nan where not worked out.
         method: of each component, empty where not worked out.
+        constant: log-weight that every world has; minus infinity if no world is possible.
         wide: components past the limit, with what it would have taken.
         largest_table: number of entries.
     """
@@ -75,6 +78,7 @@ class Distributions:
     label: Int32
     log_z: Float
     method: list[str]
+    constant: float
     wide: list[tuple[Part, TooWide]] = field(default_factory=list)
     largest_table: int = 0
 
@@ -99,13 +103,13 @@ def marginals_of(
         LimitReached: a component is too wide.
         QueryMistake: a weight is not known.
     """
-    potentials = potentials_of(network)
+    potentials = potentials_of(network, chained=True)
     asked = np.zeros(network.n_atoms, np.bool_)
     asked[slice(None) if atoms is None else atoms] = True
     wanted = np.zeros(len(potentials.cardinality), np.bool_)
     wanted[network.variable[asked]] = True
     found = distributions_of(potentials, wanted, wanted if atoms is not None else None, width_limit)
-    if np.isneginf(potentials.constant) or np.isneginf(found.log_z).any():
+    if np.isneginf(found.constant) or np.isneginf(found.log_z).any():
         raise contradiction(network)
     if found.wide and too_wide == "raise":
         raise limit_reached(network, found.wide, width_limit)
@@ -113,7 +117,7 @@ def marginals_of(
     label = found.label[network.variable]
     method = tuple(found.method[c] if a else "" for c, a in zip(label.tolist(), asked.tolist(), strict=True))
     wide = tuple(part.component for part, _ in found.wide)
-    log_z = float(found.log_z.sum() + potentials.constant)
+    log_z = float(found.log_z.sum() + found.constant)
     exact = ~np.isnan(probability)
     n_components = len(np.unique(found.label[: network.n_variables]))
     return AtomProbabilities(probability, exact, method, log_z, n_components, found.largest_table, label, wide)
@@ -130,30 +134,36 @@ def distributions_of(
         needed: shape (n_variables,): only components with one of these are looked at; None for all components.
         width_limit: largest number of entries of a table.
     """
-    core, leaves = peel(potentials, maximise=False)
-    wanted, division = with_parents(leaves, wanted), divide(core)
-    found = _nothing_yet(potentials, division, leaves)
+    flat, folded = fold(potentials)
+    core, leaves = peel(flat, maximise=False)
+    gone: tuple[Gone, ...] = (*folded, *leaves)
+    more = len(core.cardinality) - len(wanted)
+    cardinality = np.concatenate([potentials.cardinality, flat.cardinality[len(wanted) :]])
+    wanted, division = with_parents(gone, np.pad(wanted, (0, more))), divide(core)
+    found = _nothing_yet(cardinality, flat.constant, division, gone)
     take = np.ones(division.n_components, np.bool_)
     if needed is not None:
-        take = np.bincount(division.label[with_parents(leaves, needed)], minlength=division.n_components) > 0
+        needed = with_parents(gone, np.pad(needed, (0, more)))
+        take = np.bincount(division.label[needed], minlength=division.n_components) > 0
     for batch in batches(division, take):
         _list_worlds(batch, found)
     for part in parts(division, take):
         _eliminate(part, wanted, width_limit, found)
     put_back_distributions(leaves, found.start, found.probability)
-    for component in np.unique(found.label[changed_by(leaves)]).tolist():
+    unfold(folded, found.start, found.probability)
+    for component in np.unique(found.label[changed_by(gone)]).tolist():
         found.method[component] = found.method[component] and ELIMINATION
     return found
 
 
-def _nothing_yet(potentials: Potentials, division: Division, leaves: tuple[Leaves, ...]) -> Distributions:
+def _nothing_yet(cardinality: Int32, constant: float, division: Division, gone: Sequence[Gone]) -> Distributions:
     """Distributions to be filled in."""
-    cardinality, n = potentials.cardinality, division.n_components
+    n = division.n_components
     start = np.cumsum(cardinality, dtype=np.int64) - cardinality
-    label = put_back_labels(leaves, division.label)
+    label = put_back_labels(gone, division.label)
     log_z = np.full(n, np.nan)
     log_z[division.label[label != division.label]] = 0.0
-    return Distributions(start, np.full(int(cardinality.sum()), np.nan), label, log_z, [""] * n)
+    return Distributions(start, np.full(int(cardinality.sum()), np.nan), label, log_z, [""] * n, constant)
 
 
 def _list_worlds(batch: Batch, found: Distributions) -> None:

@@ -6,7 +6,9 @@ after round, as long as a round has enough of them to be worth it. Elimination d
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -17,6 +19,18 @@ from mlnlite.infer.potentials import Potentials
 
 FEWEST = 64
 _LARGEST = 4096
+
+
+class Gone(Protocol):
+    """Variables that were summed out, each hanging on another one."""
+
+    @property
+    def variable(self) -> Int64:
+        """Shape (n,)."""
+
+    @property
+    def hangs_on(self) -> Int64:
+        """Shape (n,), the variable that each hangs on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +47,11 @@ class Leaves:
     variable: Int64
     parent: Int64
     table: Float
+
+    @property
+    def hangs_on(self) -> Int64:
+        """The parents."""
+        return self.parent
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,17 +198,17 @@ def _pick(cells: Cells, which: Bool) -> Cells:
     return Cells(cells.scope[which], cells.value[which], cells.amount[which])
 
 
-def with_parents(leaves: tuple[Leaves, ...], wanted: Bool) -> Bool:
+def with_parents(gone: Sequence[Gone], wanted: Bool) -> Bool:
     """The wanted variables and those that they hang on."""
     wanted = wanted.copy()
-    for group in leaves:
-        wanted[group.parent[wanted[group.variable]]] = True
+    for group in gone:
+        wanted[group.hangs_on[wanted[group.variable]]] = True
     return wanted
 
 
-def changed_by(leaves: tuple[Leaves, ...]) -> Int64:
-    """The variables that leaves hung on."""
-    return np.concatenate([group.parent for group in leaves] or [np.zeros(0, np.int64)])
+def changed_by(gone: Sequence[Gone]) -> Int64:
+    """The variables that others hung on."""
+    return np.concatenate([group.hangs_on for group in gone] or [np.zeros(0, np.int64)])
 
 
 def put_back_values(leaves: tuple[Leaves, ...], values: Int64) -> None:
@@ -214,9 +233,9 @@ def put_back_distributions(leaves: tuple[Leaves, ...], start: Int64, probability
         probability[start[group.variable, None] + np.arange(n_values)] = own
 
 
-def put_back_labels(leaves: tuple[Leaves, ...], label: Int32) -> Int32:
-    """Components of all variables, leaves in that of their parents."""
+def put_back_labels(gone: Sequence[Gone], label: Int32) -> Int32:
+    """Components of all variables, those that are gone in that of what they hung on."""
     label = label.copy()
-    for group in reversed(leaves):
-        label[group.variable] = label[group.parent]
+    for group in reversed(gone):
+        label[group.variable] = label[group.hangs_on]
     return label

@@ -10,6 +10,7 @@ import numpy as np
 from mlnlite.errors import QueryMistake
 from mlnlite.ground.network import Bool, Clauses, Float, Int32, Int64, Network, Tables
 from mlnlite.infer.conjunctions import MAX_ARITY, Cells, Conjunctions, cells_of, split_wide
+from mlnlite.infer.counting import Chains, chains_of, diagram, written_out
 from mlnlite.infer.propagate import propagate
 
 
@@ -22,15 +23,22 @@ class Potentials:
         cells: at most one for each arity, arity rising; what hard formulas force is drawn (see `propagate`).
         constant: log-weight that every world has, the groundings that evidence decides included; minus infinity if no
             world is possible.
+        chains: counting factors that are not among the cells.
     """
 
     cardinality: Int32
     cells: tuple[Cells, ...]
     constant: float
+    chains: tuple[Chains, ...] = ()
 
 
 def potentials_of(
-    network: Network, extra: Sequence[Conjunctions] = (), auxiliary: int = 0, max_arity: float = MAX_ARITY
+    network: Network,
+    extra: Sequence[Conjunctions] = (),
+    auxiliary: int = 0,
+    max_arity: float = MAX_ARITY,
+    *,
+    chained: bool = False,
 ) -> Potentials:
     """The log-potentials of a network.
 
@@ -39,6 +47,7 @@ def potentials_of(
         extra: further conjunctions, over the variables of the network and `auxiliary` binary ones after them.
         auxiliary: number of those.
         max_arity: longer conjunctions become chains of auxiliary variables.
+        chained: leave counting factors as `chains`, do not write them out as cells.
 
     Raises:
         QueryMistake: a weight is not known.
@@ -51,6 +60,13 @@ def potentials_of(
     for tables in network.tables:
         rows += _table_rows(network, tables)
     cardinality = np.concatenate([network.cardinality, np.full(auxiliary, 2, np.int32)])
+    chains = chains_of(network)
+    for chain in [] if chained else chains:
+        plan = diagram(chain.worth, chain.steps)
+        if plan is None:
+            return Potentials(cardinality, (), -np.inf)
+        add, cardinality, _ = written_out(chain, plan, cardinality)
+        rows += add
     narrow: list[Conjunctions] = []
     for row in rows:
         parts, cardinality = split_wide(row, cardinality, max_arity)
@@ -59,7 +75,7 @@ def potentials_of(
     for row in narrow:
         add_cells, gain = cells_of(row, cardinality)
         cells, constant = [*cells, *add_cells], constant + gain
-    return Potentials(cardinality, *propagate(cells, cardinality, constant))
+    return Potentials(cardinality, *propagate(cells, cardinality, constant), tuple(chains) if chained else ())
 
 
 def check_weights(network: Network) -> None:

@@ -16,7 +16,7 @@ def start_worlds(network: Network, n: int, rng: np.random.Generator) -> Bool:
     """Worlds far apart from each other.
 
     Args:
-        network: without counting factors for hard formulas.
+        network: what was ground.
         n: how many.
         rng: where their chance comes from.
 
@@ -45,7 +45,7 @@ def can_differ(network: Network, atoms: Int64, truth: Bool) -> Bool:
     """Whether hard formulas allow atoms to have the other value.
 
     Args:
-        network: without counting factors for hard formulas.
+        network: what was ground.
         atoms: shape (n,), indices into `network.atoms`.
         truth: shape (n,), the value that each has.
     """
@@ -64,6 +64,6 @@ def _solver(network: Network) -> Iterator[Solver]:
             solver.add_clause([a, -a])
         for literals in block_clauses(network):
             solver.add_clause(literals)
-        for _, literals in hard_clauses(network):
+        for _, literals in hard_clauses(network, network.n_atoms + 1):
             solver.add_clause(literals)
         yield solver

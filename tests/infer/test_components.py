@@ -14,13 +14,14 @@ def test_components_are_those_of_the_graph(net):
     graph = nx.Graph()
     graph.add_nodes_from(range(net.n_variables))
     scopes = [net.variable[np.abs(c.literals) - 1] for c in net.clauses] + [net.variable[t.atoms] for t in net.tables]
+    scopes += [net.variable[np.abs(c.literals) - 1] for c in net.counts]
     for scope in scopes:
         for row in scope.tolist():
             nx.add_path(graph, row)
     found = components_of(net)
     assert [c.variables.tolist() for c in found] == sorted(map(sorted, nx.connected_components(graph)))
     for b, scope in enumerate(scopes):
-        rows = [(c.clauses + c.tables)[b] for c in found]
+        rows = [(c.clauses + c.tables + c.counts)[b] for c in found]
         assert sorted(np.concatenate(rows).tolist()) == list(range(len(scope)))
         for component, own in zip(found, rows, strict=True):
             assert np.isin(scope[own], component.variables).all()
