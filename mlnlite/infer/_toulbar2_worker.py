@@ -1,7 +1,7 @@
 """The process that runs toulbar2: problems come in on standard input, answers go out on standard output.
 
-toulbar2 holds the interpreter lock while it solves, keeps its options in globals and prints where it likes, so it gets
-a process of its own: `python -m mlnlite.infer._toulbar2_worker`.
+toulbar2 holds the interpreter lock while it solves and prints where it likes, so it gets a process of its own. What it
+keeps in globals can spoil the proof of a later problem, so each problem gets a fork.
 """
 
 from __future__ import annotations
@@ -19,8 +19,14 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     for line in sys.stdin:
-        answers.write(json.dumps(solve(json.loads(line))) + "\n")
-        answers.flush()
+        child = os.fork()
+        if child == 0:
+            answers.write(json.dumps(solve(json.loads(line))) + "\n")
+            answers.flush()
+            os._exit(0)
+        if os.waitpid(child, 0)[1]:
+            answers.write("null\n")
+            answers.flush()
 
 
 def solve(problem: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -46,7 +47,7 @@ def _end(process: subprocess.Popen[str] | None) -> None:
     """Ends a worker, and forgets what was still on its way to it."""
     if process is None:
         return
-    process.kill()
+    _kill(process)
     process.wait()
     for pipe in (process.stdin, process.stdout):
         assert pipe is not None
@@ -58,7 +59,10 @@ def _started(name: str) -> subprocess.Popen[str]:
     """A running worker."""
     command = [sys.executable, "-P", str(Path(__file__).with_name(f"{name}.py"))]
     pipe, environment = subprocess.PIPE, {**os.environ, "PYTHONHASHSEED": "0"}
-    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True, env=environment)
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen(
+        command, stdin=pipe, stdout=pipe, stderr=quiet, text=True, env=environment, start_new_session=True
+    )
 
 
 def _asked(process: subprocess.Popen[str], problem: dict[str, Any], deadline: Deadline) -> dict[str, Any] | None:
@@ -84,5 +88,14 @@ def _watch(process: subprocess.Popen[str], deadline: Deadline, done: Event) -> N
     while not done.wait(_TICK):
         if deadline.is_over:
             if not done.wait(_GRACE):
-                process.kill()
+                _kill(process)
             return
+
+
+def _kill(process: subprocess.Popen[str]) -> None:
+    """Kills a worker with its children."""
+    if sys.platform == "win32":
+        process.kill()
+        return
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
