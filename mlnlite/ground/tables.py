@@ -62,11 +62,12 @@ def _completed(predicate: Predicate, evidence: Evidence) -> Facts:
         last = _last_values(predicate, rows, facts.truth, evidence)
         true = np.concatenate([true, last])
     others = _other_values(true, column, present)
-    false = np.unique(np.concatenate([rows[~facts.truth], others]), axis=0)
-    every = np.concatenate([true, false]).astype(np.int32)
-    truth = np.arange(len(every)) < len(true)
+    every = np.concatenate([true, rows[~facts.truth], others]).astype(np.int32)
     order = np.lexsort(tuple(reversed(every.T)))
-    return Facts(every[order, 0], every[order, 1:], truth[order])
+    every, truth = every[order], order < len(true)
+    new = np.ones(len(every), np.bool_)
+    new[1:] = (every[1:] != every[:-1]).any(axis=1) | truth[1:] | truth[:-1]
+    return Facts(every[new, 0], every[new, 1:], truth[new])
 
 
 def _other_values(true: Int32, column: int, present: NDArray[np.bool_]) -> Int32:
@@ -82,6 +83,8 @@ def _other_values(true: Int32, column: int, present: NDArray[np.bool_]) -> Int32
 def _last_values(predicate: Predicate, rows: Int32, truth: NDArray[np.bool_], evidence: Evidence) -> Int32:
     """Rows that are true because every other value of their block is known to be false."""
     assert predicate.value is not None
+    if truth.all():
+        return rows[:0]
     column = predicate.value + 1
     present = evidence.present[predicate.types[predicate.value]]
     keys = np.delete(rows, column, axis=1)

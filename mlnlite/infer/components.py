@@ -62,12 +62,17 @@ def _few(n_variables: int, start: Int32, end: Int32) -> Int32:
 
 
 def _many(n_variables: int, start: Int32, end: Int32) -> Int32:
-    """Some number for each component, by SciPy."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_matrix((np.ones(len(start), np.int8), (start, end)), shape=(n_variables, n_variables))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int32)
+    """The smallest variable of each component: those of linked variables meet, all at once, until nothing changes."""
+    label = np.arange(n_variables, dtype=np.int32)
+    while len(start):
+        a, b = label[start], label[end]
+        low, high = np.minimum(a, b), np.maximum(a, b)
+        open_ = low != high
+        start, end = start[open_], end[open_]
+        np.minimum.at(label, high[open_], low[open_])
+        while (label[label] != label).any():
+            label = label[label]
+    return label
 
 
 def rows_by_label(labels: Int32, n_labels: int) -> tuple[Int64, Int64]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mlnlite.results.rows import Bool, Float, Int64, Rows, Statistics
-from mlnlite.results.table import json_number, order_of_rows, text_table
+from mlnlite.results.table import json_number, order_of_rows
 
 _PAID = 10
 
@@ -104,18 +104,21 @@ class MapState(Rows[bool]):
         if isfinite(self.cost):
             open_ = f"{self.open_cost:.6f} of it where evidence leaves a choice"
             summary.insert(0, f"cost: {self.cost:.6f}, {open_}; no world costs less than {self.cost - self.gap:.6f}")
-        return text_table(self.head(), self.cells(), limit, [*paid, *summary, str(self.statistics)])
+        return self.table(limit, [*paid, *summary, str(self.statistics)])
 
     def head(self) -> tuple[str, ...]:
         """Names of the columns of the table."""
         return ("true atom", "method") if self.margins is None else ("true atom", "margin", "method")
 
-    def cells(self) -> list[tuple[str, ...]]:
+    def order(self) -> list[int]:
+        """The true atoms."""
+        return [i for i in order_of_rows(self.names, self.block) if self.truth[i]]
+
+    def cells(self, rows: Sequence[int]) -> list[tuple[str, ...]]:
         """Cells of the table."""
-        true = [i for i in order_of_rows(self.names, self.block) if self.truth[i]]
         if self.margins is None:
-            return [(self.names[i], self.methods[i]) for i in true]
-        return [(self.names[i], f"{self.margins[i]:.4f}", self.methods[i]) for i in true]
+            return [(self.names[i], self.methods[i]) for i in rows]
+        return [(self.names[i], f"{self.margins[i]:.4f}", self.methods[i]) for i in rows]
 
     def caption(self) -> str:
         """The whole in a line."""

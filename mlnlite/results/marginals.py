@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mlnlite.results.arviz import inference_data
 from mlnlite.results.rows import Bool, Float, Int64, Rows, Statistics
-from mlnlite.results.table import json_number, number_cell, order_of_rows, text_table
+from mlnlite.results.table import json_number, number_cell, order_of_rows
 
 Float32 = NDArray[np.float32]
 
@@ -76,20 +76,23 @@ class Marginals(Rows[float]):
             limit: show at most so many rows.
         """
         summary = [f"status: {self.status}"] + ([f"log Z = {self.log_z:.6f}"] if isfinite(self.log_z) else [])
-        return text_table(self.head(), self.cells(), limit, [", ".join(summary), str(self.statistics)])
+        return self.table(limit, [", ".join(summary), str(self.statistics)])
 
     def head(self) -> tuple[str, ...]:
         """Names of the columns."""
         return (*_HEAD[:2], "R-hat", "effective size", *_HEAD[2:]) if self.draws else _HEAD
 
-    def cells(self) -> list[tuple[str, ...]]:
+    def order(self) -> list[int]:
+        """All rows."""
+        return order_of_rows(self.names, self.block)
+
+    def cells(self, rows: Sequence[int]) -> list[tuple[str, ...]]:
         """Cells of the table."""
-        order = order_of_rows(self.names, self.block)
-        rows = []
-        for i in order:
+        found = []
+        for i in rows:
             extra = [number_cell(values[i], form) for values, form in self._diagnostics()]
-            rows.append((self.names[i], self._bar(i), *extra, self.methods[i]))
-        return rows
+            found.append((self.names[i], self._bar(i), *extra, self.methods[i]))
+        return found
 
     def _diagnostics(self) -> Sequence[tuple[Float, str]]:
         """R-hat and effective sizes, with how to write them, if anything was sampled."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import QueryMistake, did_you_mean
-from mlnlite.results.table import SHOWN, data_frame, html_table
+from mlnlite.results.table import SHOWN, data_frame, html_table, text_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,9 +72,8 @@ class Rows(Mapping[str, Value]):
     _index: dict[str, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Prepares look-up with and without spaces; a text itself goes before what another is without them."""
-        squeezed = {"".join(name.split()): i for i, name in enumerate(self.names)}
-        object.__setattr__(self, "_index", squeezed | {name: i for i, name in enumerate(self.names)})
+        """Leaves room for look-up, which the first one prepares."""
+        object.__setattr__(self, "_index", {})
 
     def __iter__(self) -> Iterator[str]:
         """The texts."""
@@ -90,6 +89,9 @@ class Rows(Mapping[str, Value]):
         Raises:
             UnknownRowError: the answer does not hold it.
         """
+        if not self._index:  # a text itself goes before what another one is without spaces
+            self._index.update({"".join(text.split()): i for i, text in enumerate(self.names)})
+            self._index.update({text: i for i, text in enumerate(self.names)})
         row = self._index.get(name, self._index.get("".join(name.split())))
         if row is None:
             raise UnknownRowError(f"the result holds no {name}", hint=did_you_mean(name, self.names))
@@ -116,8 +118,18 @@ class Rows(Mapping[str, Value]):
         """Names of the columns of the table."""
 
     @abstractmethod
-    def cells(self) -> list[tuple[str, ...]]:
-        """Rows of the table."""
+    def order(self) -> list[int]:
+        """Which rows the table shows, in its order."""
+
+    @abstractmethod
+    def cells(self, rows: Sequence[int]) -> list[tuple[str, ...]]:
+        """Some rows of the table."""
+
+    def table(self, limit: int | None, foot: Sequence[str]) -> str:
+        """The table, of at most `limit` rows, and lines under it."""
+        order = self.order()
+        shown = order[:limit]
+        return text_table(self.head(), self.cells(shown), len(order) - len(shown), foot)
 
     @abstractmethod
     def caption(self) -> str:
@@ -125,7 +137,8 @@ class Rows(Mapping[str, Value]):
 
     def _repr_html_(self) -> str:
         """A table for notebooks."""
-        return html_table(self.head(), self.cells(), self.caption())
+        order = self.order()
+        return html_table(self.head(), self.cells(order[:SHOWN]), max(0, len(order) - SHOWN), self.caption())
 
     def to_json(self, indent: int | None = 2) -> str:
         """JSON text."""

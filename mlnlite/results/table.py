@@ -21,20 +21,19 @@ SHOWN = 60
 """Rows that are shown unless all are asked for."""
 
 
-def text_table(head: tuple[str, ...], rows: list[tuple[str, ...]], limit: int | None, foot: Sequence[str]) -> str:
-    """A table in plain text."""
-    shown = [head, *(rows if limit is None else rows[:limit])]
+def text_table(head: tuple[str, ...], rows: list[tuple[str, ...]], left: int, foot: Sequence[str]) -> str:
+    """A table in plain text; `left` says how many rows are not in it."""
+    shown = [head, *rows]
     widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
     lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in shown]
     lines.insert(1, "  ".join("-" * w for w in widths))
-    left = len(rows) - len(shown) + 1
     return "\n".join([*lines, *([f"... {left:,} more"] if left else []), *foot])
 
 
-def html_table(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str) -> str:
-    """A table in HTML, its first rows if there are many."""
-    body = "".join(f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in row)}</tr>" for row in rows[:SHOWN])
-    more = f" ({len(rows) - SHOWN:,} more rows)" if len(rows) > SHOWN else ""
+def html_table(head: tuple[str, ...], rows: list[tuple[str, ...]], left: int, caption: str) -> str:
+    """A table in HTML; `left` says how many rows are not in it."""
+    body = "".join(f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in row)}</tr>" for row in rows)
+    more = f" ({left:,} more rows)" if left else ""
     top = "".join(f"<th>{escape(h)}</th>" for h in head)
     caption = f"<caption>{escape(caption)}{more}</caption>"
     return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
@@ -52,12 +51,12 @@ def data_frame(columns: Mapping[str, object]) -> pd.DataFrame:
 def order_of_rows(names: Sequence[str], block: Int64 | None) -> list[int]:
     """Rows predicate by predicate, block by block, otherwise as given."""
     predicates: dict[str, int] = {}
-    for name in names:
-        predicates.setdefault(name.partition("(")[0], len(predicates))
-    blocks: dict[int, int] = {}
-    first = [i if b < 0 else blocks.setdefault(b, i) for i, b in enumerate([] if block is None else block.tolist())]
-    place = first or range(len(names))
-    return sorted(range(len(names)), key=lambda i: (predicates[names[i].partition("(")[0]], place[i], i))
+    predicate = [predicates.setdefault(name.partition("(")[0], len(predicates)) for name in names]
+    place = np.arange(len(names))
+    if block is not None:
+        _, first, inverse = np.unique(block, return_index=True, return_inverse=True)
+        place = np.where(block < 0, place, first[inverse])
+    return np.lexsort((place, predicate)).tolist()
 
 
 def number_cell(value: float, form: str) -> str:
