@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
-from pysat.solvers import Solver
 
 from mlnlite.errors import Contradiction, Diagnostic
 from mlnlite.ground.network import Network
@@ -39,6 +38,8 @@ def contradiction(network: Network) -> Contradiction:
 
 def _core(network: Network) -> list[int]:
     """Hard weights that exclude each other: the solver's core, less each that can be left out."""
+    from pysat.solvers import Solver
+
     first = network.n_atoms + 1
     with Solver(name="cadical153") as solver:
         for literals in block_clauses(network):

@@ -14,7 +14,7 @@ import numpy as np
 from mlnlite.ground.network import Int32, Int64
 
 Rule = Literal["fill", "weight", "sweep"]
-_EXPENSIVE = 1 << 18
+_EXPENSIVE = 1 << 21
 
 
 @dataclass(frozen=True, slots=True)
