@@ -51,12 +51,13 @@ def data_frame(columns: Mapping[str, object]) -> pd.DataFrame:
 def order_of_rows(names: Sequence[str], block: Int64 | None) -> list[int]:
     """Rows predicate by predicate, block by block, otherwise as given."""
     predicates: dict[str, int] = {}
-    predicate = [predicates.setdefault(name.partition("(")[0], len(predicates)) for name in names]
+    predicate = np.array([predicates.setdefault(name.partition("(")[0], len(predicates)) for name in names], np.int64)
     place = np.arange(len(names))
     if block is not None:
         _, first, inverse = np.unique(block, return_index=True, return_inverse=True)
         place = np.where(block < 0, place, first[inverse])
-    return np.lexsort((place, predicate)).tolist()
+    order: list[int] = np.lexsort((place, predicate)).tolist()
+    return order
 
 
 def number_cell(value: float, form: str) -> str:
