@@ -4,7 +4,6 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 OUT ?= out
-EXAMPLES := docs/examples
 CODE := mlnlite domains tests benchmarks
 TREE := build/tree# the package as it is installed: domains/ and grammars/ inside
 
@@ -14,15 +13,8 @@ TREE := build/tree# the package as it is installed: domains/ and grammars/ insid
 help:  ## what there is to make
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 12
 
-demo: $(VENV)/.installed  ## learn the example model, then ask it
-	@mkdir -p $(OUT)
-	$(BIN)/mlnlite learn $(EXAMPLES)/handover.mln $(EXAMPLES)/handover.db --predict graspRegion,handover -o $(OUT)/handover.mln
-	@echo
-	$(BIN)/mlnlite query $(OUT)/handover.mln -e $(EXAMPLES)/jug.db -q graspRegion,handover --closed-world all
-	@echo
-	$(BIN)/mlnlite query $(OUT)/handover.mln -e $(EXAMPLES)/jug.db -q graspRegion,handover --closed-world all --task map
-	@echo
-	@echo "The learnt model is $(OUT)/handover.mln; what it was learnt from and asked about is in $(EXAMPLES)/."
+demo: $(VENV)/.installed  ## train, hand an unseen object over, say why, draw it
+	$(BIN)/mlnlite handover demo --out $(OUT)
 
 test: $(VENV)/.installed-dev  ## run all tests
 	$(BIN)/python -m pytest -q -n auto $(ARGS)
@@ -50,7 +42,7 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[handover]'
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python

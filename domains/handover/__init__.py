@@ -30,6 +30,21 @@ if TYPE_CHECKING:
     from mlnlite.domains.handover.fields import cost_field as cost_field
     from mlnlite.domains.handover.grasps import sample_grasps as sample_grasps
     from mlnlite.domains.handover.ik import damped_least_squares as damped_least_squares
+    from mlnlite.domains.handover.instances.generate import facts_of as facts_of
+    from mlnlite.domains.handover.instances.generate import generate as generate
+    from mlnlite.domains.handover.knowledge.advise import Advice as Advice
+    from mlnlite.domains.handover.knowledge.advise import advice_text as advice_text
+    from mlnlite.domains.handover.knowledge.advise import advise as advise
+    from mlnlite.domains.handover.knowledge.ask import Answer as Answer
+    from mlnlite.domains.handover.knowledge.ask import Knowledge as Knowledge
+    from mlnlite.domains.handover.knowledge.ask import ask as ask
+    from mlnlite.domains.handover.knowledge.ask import certify as certify
+    from mlnlite.domains.handover.knowledge.ask import explain as explain
+    from mlnlite.domains.handover.knowledge.ask import open_knowledge as open_knowledge
+    from mlnlite.domains.handover.knowledge.ask import read_learnt as read_learnt
+    from mlnlite.domains.handover.knowledge.train import train as train
+    from mlnlite.domains.handover.knowledge.train import write_knowledge as write_knowledge
+    from mlnlite.domains.handover.knowledge.words import read_knowledge as read_knowledge
     from mlnlite.domains.handover.methods import hand_over as hand_over
     from mlnlite.domains.handover.mobility import MobilityLevel as MobilityLevel
     from mlnlite.domains.handover.mobility import read_levels as read_levels
@@ -58,6 +73,11 @@ _HOMES = {
     "fields": "Options cost_field",
     "grasps": "sample_grasps",
     "ik": "damped_least_squares",
+    "instances.generate": "facts_of generate",
+    "knowledge.advise": "Advice advice_text advise",
+    "knowledge.ask": "Answer Knowledge ask certify explain open_knowledge read_learnt",
+    "knowledge.train": "train write_knowledge",
+    "knowledge.words": "read_knowledge",
     "methods": "hand_over",
     "mobility": "MobilityLevel read_levels",
     "objects": "HandoverObject object_names read_object",

@@ -50,7 +50,7 @@ def five_checks(scene: Scene, found: Configuration, limits: Limits | None = None
         _plan(scene, grasps, found),
         _reach(scene, found),
         _affordance(scene, grasps, found),
-        _safe(scene, grasps, found, limits or Limits()),
+        _safe(scene, found, limits or Limits()),
     )
 
 
@@ -90,12 +90,14 @@ def _affordance(scene: Scene, grasps: GraspSet, found: Configuration) -> Check:
                  f"{100 * covered:.0f} % of {name!r} covered{', grasped by the robot' if inside else ''}")  # fmt: skip
 
 
-def _safe(scene: Scene, grasps: GraspSet, found: Configuration, limits: Limits) -> Check:
-    least = _least_distance(scene, grasps, found, Options(limits=limits))
+def _safe(scene: Scene, found: Configuration, limits: Limits) -> Check:
+    least = least_distance(scene, found)
     return Check("safe", least >= limits.safety, f"keeps {100 * least:.1f} cm from hand and face")
 
 
-def _least_distance(scene: Scene, grasps: GraspSet, found: Configuration, options: Options) -> float:
+def least_distance(scene: Scene, found: Configuration, options: Options | None = None) -> float:
+    """The least distance that a configuration keeps from hand and face [m], as the options measure it."""
+    grasps, options = sample_grasps(scene.thing, scene.robot.gripper), options or Options()
     points = cost_points(scene, grasps.centres[found.grasp])
     at = found.thing.position[None], found.thing.rotation[None, None]
     parts = distances(points, *at, options.distance)
@@ -126,7 +128,7 @@ def violations(scene: Scene, found: Configuration, options: Options | None = Non
         out.append("the tool is not at the grasp")
     if angle_between(tool.rotation, wanted.rotation) > near.rotation + 1e-6:
         out.append("the tool is not turned as the grasp")
-    if _least_distance(scene, grasps, found, options) < options.limits.safety:
+    if least_distance(scene, found, options) < options.limits.safety:
         out.append("hand or face is too near")
     if _reach_distance(scene, grasps, found, options) > options.limits.reach + 1e-9:
         out.append("the hand would move too far")

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from mlnlite.domains.handover import load
+
+if TYPE_CHECKING:
+    from mlnlite.domains.handover.knowledge.advise import Advice
+    from mlnlite.domains.handover.knowledge.ask import Knowledge
 
 
 @click.command()
@@ -16,33 +21,63 @@ from mlnlite.domains.handover import load
 @click.option("--level", default="L", show_default=True, help="Their arm mobility.")
 def demo(out: str, thing: str, task: str, level: str) -> None:
     """Train on generated instances, hand an unseen object over, say why, draw it and simulate it."""
-    generate, training, words = load("instances.generate"), load("knowledge.train"), load("knowledge.words")
-    asking, advising, simulate = load("knowledge.ask"), load("knowledge.advise"), load("execution.simulate")
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
+    scene = load("scene").make_scene(thing, task, level)
+    knowledge = _trained(folder, thing)
+    advice = load("knowledge.advise").advise(knowledge, scene)
+    proof = load("knowledge.ask").certify(knowledge, scene.thing, task, level)
+    click.echo("\n" + load("knowledge.advise").advice_text(advice, proof) + "\n")
+    _draw(folder, advice)
+    _simulate(folder, advice)
+    click.echo(f"written to {folder}:")
+    for name, what in _WRITTEN.items():
+        if (folder / name).exists():
+            click.echo(f"  {name:<20} {what}")
+    click.echo(f"Open {folder / 'handover.html'} in a browser. To turn the sliders yourself: "
+               f"mlnlite handover optimise --object {thing} --task {task} --level {level} --view")  # fmt: skip
+
+
+_WRITTEN = {
+    "handover-learnt.mln": "the learnt model",
+    "handover.png": "costs about the receiver, and the scene from the side",
+    "reach.png": "the reach cost in 3-D",
+    "preferences.png": "what people of each mobility prefer, which the instances follow",
+    "execution.jsonl": "the simulated execution, step by step",
+    "handover.html": "the same as a scene that plays in a browser",
+}
+
+
+def _trained(folder: Path, thing: str) -> Knowledge:
+    """A model of all generated instances but those of one object."""
+    generate, training = load("instances.generate"), load("knowledge.train")
     rows = [row for row in generate.generate() if row.thing != thing]
-    click.echo(
-        f"training on {len(rows):,} generated instances of {len({r.thing for r in rows})} objects, {thing} left out"
-    )
-    learned = training.train(words.read_knowledge(), generate.facts_of(rows))
+    click.echo(f"training on {len(rows):,} generated instances of {len({r.thing for r in rows})} objects, "
+               f"{thing} left out")  # fmt: skip
+    learned = training.train(load("knowledge.words").read_knowledge(), generate.facts_of(rows))
     training.write_knowledge(learned, folder / "handover-learnt.mln")
-    knowledge, known = asking.open_knowledge(learned.model), load("objects").read_object(thing)
-    advice = advising.advise(knowledge, known, task, level)
-    click.echo(advising.advice_text(advice, asking.certify(knowledge, known, task, level)))
-    figures = load("figures")
-    written = ["handover-learnt.mln"]
-    if advice.configuration is not None:
-        figures.save(figures.draw_configuration(advice.scene, advice.configuration), folder / "handover.png")
-        written.append("handover.png")
-    survey = load("study.simulate").simulate()
-    figures.save(load("study.figures").draw_preferences(survey), folder / "preferences.png")
-    case = simulate.Case(thing, task, level, advice.answer.method, "pr2", "drift")
+    knowledge: Knowledge = load("knowledge.ask").open_knowledge(learned.model)
+    return knowledge
+
+
+def _draw(folder: Path, advice: Advice) -> None:
+    figures, fields = load("figures"), load("fields")
+    figures.save(load("study.figures").draw_preferences(load("study.simulate").simulate()), folder / "preferences.png")
+    found, scene = advice.configuration, advice.scene
+    if found is not None and scene is not None:
+        grasps = load("grasps").sample_grasps(scene.thing, scene.robot.gripper)
+        figures.save(figures.draw_configuration(scene, found), folder / "handover.png")
+        figures.save(figures.draw_field(fields.cost_field(scene, grasps, found.grasp, fields.Options())),
+                     folder / "reach.png")  # fmt: skip
+
+
+def _simulate(folder: Path, advice: Advice) -> None:
+    """Does what the advice says, with a hand that drifts."""
+    simulate, level = load("execution.simulate"), load("knowledge.ask").likeliest(advice.answer.levels)
+    case = simulate.Case(advice.thing.name, advice.task, level, advice.answer.method, "pr2", "drift")
     run, track = simulate.simulate(case)
     found = simulate.judge(case, run, track)
     load("execution.log").write_log(run, folder / "execution.jsonl")
-    load("execution.replay").record(simulate.scene_at(case, None), run, folder / "execution.viser")
+    load("execution.replay").record(simulate.scene_at(case, None), run, folder / "handover.html")
     click.echo(f"simulated: {run.end} after {run.time:.1f} s, {run.replans} new plans, never nearer than "
-               f"{100 * found.nearest:.1f} cm while moving")  # fmt: skip
-    written += ["preferences.png", "execution.jsonl", "execution.viser"]
-    click.echo(f"written to {folder}: {', '.join(written)}")
-    click.echo(f"in the browser: mlnlite handover optimise --object {thing} --task {task} --level {level} --view")
+               f"{100 * found.nearest:.1f} cm to hand or face while moving\n")  # fmt: skip

@@ -19,7 +19,7 @@ from mlnlite.domains.handover import load
 @click.option("--track", type=click.Path(dir_okay=False), help="A recorded track of hand and face (JSON).")
 @click.option("--seed", default=0, show_default=True, help="Of noise, loss of sight and the script.")
 @click.option("--log", type=click.Path(dir_okay=False), help="Write the run as JSON lines.")
-@click.option("--replay", type=click.Path(dir_okay=False), help="Write the run as a .viser recording.")
+@click.option("--replay", type=click.Path(dir_okay=False), help="Write the run as a page to play, .html, or as .viser.")
 @click.option("-n", "--many", default=0, help="Simulate so many random cases instead, and count the causes.")
 @click.option("--workers", default=2, show_default=True, help="Processes for many cases.")
 def execute(**given: Any) -> None:  # noqa: ANN401 - click passes every option by name

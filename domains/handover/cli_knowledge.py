@@ -85,16 +85,18 @@ def query(context: click.Context, /, **given: Any) -> None:  # noqa: ANN401 - cl
     thing = load("objects").read_object(given["thing"], catalogue=given["catalogue"])
     knowledge = asking.read_learnt(given["model"])
     level = parse_level(given["level"])
-    advice = advising.advise(knowledge, thing, given["task"], level, robot=given["robot"] if given["place"] else "")
+    if given["place"]:
+        scene = load("scene").make_scene(thing, given["task"], asking.likeliest(level), given["robot"])
+        advice = advising.advise(knowledge, scene, level)
+    else:
+        advice = advising.advise_without_poses(knowledge, thing, given["task"], level)
     proof = asking.certify(knowledge, thing, given["task"], level, method=given["solver"])
     echo = json.dumps(advising.advice_data(advice, proof), indent=2) if given["form"] == "json" else None
     click.echo(echo or advising.advice_text(advice, proof))
 
 
-def parse_level(text: str) -> str | dict[str, float] | None:
+def parse_level(text: str) -> str | dict[str, float]:
     """A level as the command line has it: a name, `unknown`, or shares as `L=0.7,L-M=0.3`."""
-    if text == "unknown":
-        return None
     if "=" not in text:
         return text
     pairs = [part.partition("=") for part in text.split(",")]

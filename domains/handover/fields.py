@@ -31,6 +31,7 @@ class Options:
         receiver: whether the receiver's arm must reach the object at its level of mobility.
         solver: inverse kinematics of the robot; by default damped least squares with seed 0.
         ik_calls: after so many calls of the inverse kinematics the search stops with a bound.
+        without: costs left out, to see what they are worth: of `C_A`, `C_S`, `C_R`.
     """
 
     orientations: int = 8
@@ -42,6 +43,7 @@ class Options:
     receiver: bool = True
     solver: IkSolver | None = None
     ik_calls: int = 4000
+    without: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +72,10 @@ class CostField:
 
 
 def cost_field(scene: Scene, grasps: GraspSet, grasp: int, options: Options) -> CostField:
-    """The costs of equations 3 and 4 with grasp number `grasp`. C_R is rounded to 1e-9 m, so that ties are ties."""
+    """The costs of equations 3 and 4 with grasp number `grasp`. Rounded to 1e-9 m, so that ties are ties.
+
+    A cost left out is the same everywhere and forbids nothing.
+    """
     centres = voxel_centres(scene.voxels)
     towards = presented_direction(scene.thing, scene.region)
     rotations = presenting_rotations(centres, scene.hand.position, towards, options.orientations)
@@ -78,9 +83,11 @@ def cost_field(scene: Scene, grasps: GraspSet, grasp: int, options: Options) -> 
     parts = distances(points, centres, rotations, options.distance)
     safe = safety(parts.to_hand, parts.to_face, parts.gripper_to_hand, options.limits.safety)
     reach = reachability(np.round(parts.to_grasp, 9), options.limits.reach)
+    safe = np.ones_like(safe) if "C_S" in options.without else np.round(safe, 9)
+    reach = np.zeros_like(reach) if "C_R" in options.without else reach
     excess = _excess(scene, rotations @ grasps.centres[grasp] + centres[:, None])
     allowed = (safe > 0) & np.isfinite(reach) & (excess <= 1e-3)
-    return CostField(grasp, centres, rotations, parts, np.round(safe, 9), reach, excess, allowed)
+    return CostField(grasp, centres, rotations, parts, safe, reach, excess, allowed)
 
 
 def cost_points(scene: Scene, grasp: FloatArray) -> Points:

@@ -4,9 +4,9 @@
     Psi(m) = argmax C_S(Psi, g_r*)  s.t. inverse kinematics    per voxel m, the safest pose
     m* = argmin C_R(Psi(m))                                    the voxel of least reach
 
-Best-first: voxels in order of `min_k C_R(m, k)`, a lower bound of what the solver may leave of them; when the bound
-of the next voxel is above the best found, no other voxel can win. Ties go to higher C_S, then to the lower index of
-the voxel.
+Best-first: voxels in order of `min_k C_R(m, k)`, a lower bound of what the solver may leave of them, equal ones by
+`max_k C_S(m, k)`; when these bounds of the next voxel are worse than the best found, no other voxel can win. Ties go to
+higher C_S, then to the lower index of the voxel.
 """
 
 from __future__ import annotations
@@ -120,11 +120,12 @@ def _run(scene: Scene, options: Options, exhaustive: bool) -> Handover:
     grasps = sample_grasps(scene.thing, scene.robot.gripper)
     case = _Case(scene, grasps, options, exhaustive, Counter())
     ranked, values = rank_grasps(scene, grasps)
+    if "C_A" in options.without:
+        ranked = np.random.default_rng(0).permutation(len(values))
     fields: list[CostField] = []
     for rank, grasp in enumerate(ranked[: options.grasps]):
         fields.append(cost_field(scene, grasps, int(grasp), options))
-        best, bound = _search(case, fields[-1])
-        stopped = (best is None and np.isfinite(bound)) or (best is not None and bound < best[0])
+        best, bound, stopped = _search(case, fields[-1])
         if best is not None:
             found = _configuration(case, fields[-1], best, rank, float(values[grasp]))
             return _result(case, "limit" if stopped else "optimal", found, bound)
@@ -166,20 +167,21 @@ def rank_grasps(scene: Scene, grasps: GraspSet) -> tuple[NDArray[np.int64], Floa
     return outside[np.argsort(-values[outside], kind="stable")], values
 
 
-def _search(case: _Case, costs: CostField) -> tuple[_Best | None, float]:
-    """The best of a grasp, and a bound on C_R [m] that nothing with this grasp can beat."""
+def _search(case: _Case, costs: CostField) -> tuple[_Best | None, float, bool]:
+    """The best of a grasp, a bound on C_R [m] that nothing with this grasp can beat, and whether calls ran out."""
     bounds = np.where(costs.allowed, costs.reach, np.inf).min(axis=1)
+    risks = -np.where(costs.allowed, costs.safety, 0.0).max(axis=1)
     order = np.flatnonzero(np.isfinite(bounds))
-    order = order if case.exhaustive else order[np.argsort(bounds[order], kind="stable")]
+    order = order if case.exhaustive else order[np.lexsort((risks[order], bounds[order]))]
     best: _Best | None = None
     for i, voxel in enumerate(order):
-        if not case.exhaustive and best is not None and bounds[voxel] > best[0]:
+        if not case.exhaustive and best is not None and (bounds[voxel], risks[voxel]) > best[:2]:
             break
         if case.refused["calls"] >= case.options.ik_calls:
-            return best, float(bounds[order[i:]].min())
+            return best, float(bounds[order[i:]].min()), True
         found = _safest(case, costs, int(voxel))
         best = min((b for b in (best, found) if b is not None), key=lambda b: b[:3], default=None)
-    return best, best[0] if best is not None else float("inf")
+    return best, best[0] if best is not None else float("inf"), False
 
 
 def _safest(case: _Case, costs: CostField, voxel: int) -> _Best | None:

@@ -27,6 +27,8 @@ from mlnlite.domains.handover.search import Configuration, Handover
 
 SKIN, STEEL, THING, REGION = (214, 190, 168), (68, 84, 106), (91, 143, 217), (47, 127, 111)
 """Colours of receiver, robot, object and the receiver's region."""
+CAMERA = (0.9, -1.35, 1.55), (0.50, 0.0, 1.05)
+"""Where the camera is and where it looks [m]."""
 
 
 def open_view(scene: Scene, *, port: int = 8080, host: str = "127.0.0.1") -> viser.ViserServer:
@@ -39,8 +41,7 @@ def open_view(scene: Scene, *, port: int = 8080, host: str = "127.0.0.1") -> vis
     """
     server = viser.ViserServer(host=host, port=port, verbose=False)
     server.scene.set_up_direction("+z")
-    server.initial_camera.position = (0.9, -1.35, 1.55)
-    server.initial_camera.look_at = (0.50, 0.0, 1.05)
+    server.initial_camera.position, server.initial_camera.look_at = CAMERA
     levels = [level.name for level in read_levels()]
     start = levels.index(scene.receiver.level.name) if scene.receiver.level.name in levels else 0
     marks = tuple((i, name) for i, name in enumerate(levels))
@@ -97,14 +98,19 @@ def draw(server: viser.ViserServer, scene: Scene, result: Handover, *, show_fiel
     """Puts receiver, robot, object, voxels and hand into the view, in place of what was there."""
     server.scene.reset()
     server.scene.add_grid("/floor", width=4.0, height=4.0, position=(0.5, 0.0, 0.0))
-    for i, capsule in enumerate(body_capsules(scene.receiver, scene.posture)):
-        _add_segment(server, f"/receiver/{capsule.name}_{i}", (capsule.start, capsule.end), capsule.radius, SKIN)
+    draw_receiver(server, scene)
     server.scene.add_icosphere("/palm", radius=0.012, color=(180, 60, 50), position=tuple(scene.hand.position))
     found = result.configuration
     if found is not None:
         _draw_found(server, scene, found)
         if show_field:
             _draw_field(server, scene, found)
+
+
+def draw_receiver(server: viser.ViserServer, scene: Scene) -> None:
+    """The body of the receiver as capsules."""
+    for i, capsule in enumerate(body_capsules(scene.receiver, scene.posture)):
+        _add_segment(server, f"/receiver/{capsule.name}_{i}", (capsule.start, capsule.end), capsule.radius, SKIN)
 
 
 def _draw_found(server: viser.ViserServer, scene: Scene, found: Configuration) -> None:

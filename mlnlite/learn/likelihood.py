@@ -45,12 +45,16 @@ def at(choices: Choices, weights: Float) -> Point:
     return Point(value, np.asarray(gradient), chance)
 
 
-def curvature(choices: Choices, point: Point, direction: Float) -> Float:
-    """Minus the Hessian of the log-likelihood, times `direction`."""
-    along = choices.rows @ direction
-    mean = np.bincount(choices.choice, point.chance * along, len(choices.many))
-    spread = choices.many[choices.choice] * point.chance * (along - mean[choices.choice])
-    return np.asarray(choices.rows.T @ spread)
+def curvature(choices: Choices, point: Point) -> Operator:
+    """Minus the Hessian of the log-likelihood at a point, as a product with a direction."""
+    back, weight, n = choices.rows.T, choices.many[choices.choice] * point.chance, len(choices.many)
+
+    def product(direction: Float) -> Float:
+        along = choices.rows @ direction
+        mean = np.bincount(choices.choice, point.chance * along, n)
+        return np.asarray(back @ (weight * (along - mean[choices.choice])))
+
+    return product
 
 
 def curvature_diagonal(choices: Choices, point: Point) -> Float:

@@ -123,13 +123,13 @@ def _wide(problem: Problem, x: Float) -> tuple[float, Float]:
 
 def information(problem: Problem, x: Float) -> likelihood.Operator:
     """Minus the Hessian of the log-likelihood at `x`, as a product with a vector."""
-    point = likelihood.at(problem.every, x)
-    known = None if problem.known is None else likelihood.at(problem.known, x)
+    every = likelihood.curvature(problem.every, likelihood.at(problem.every, x))
+    known = None if problem.known is None else likelihood.curvature(problem.known, likelihood.at(problem.known, x))
 
     def product(direction: Float) -> Float:
-        bend = likelihood.curvature(problem.every, point, direction)
-        if problem.known is not None and known is not None:
-            bend = bend - likelihood.curvature(problem.known, known, direction)
+        bend = every(direction)
+        if known is not None:
+            bend = bend - known(direction)
         if problem.wide:
             step = 1e-4 / max(1.0, float(np.abs(direction).max(initial=0.0)))
             ahead, behind = (_wide(problem, x + s * step * direction)[1] for s in (1, -1))

@@ -20,6 +20,7 @@ from mlnlite.domains.handover.knowledge.reasons import said
 from mlnlite.domains.handover.knowledge.train import train, write_knowledge
 from mlnlite.domains.handover.knowledge.words import ASKED, VARIANTS, read_knowledge, role_of, roles_table
 from mlnlite.domains.handover.objects import object_names, read_object
+from mlnlite.domains.handover.scene import make_scene
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,7 @@ def test_uncertain_levels_mix_the_answers(knowledge):
     high, low = (ask(knowledge, mug, "to_pour", level).methods for level in ("H", "L"))
     mixed = ask(knowledge, mug, "to_pour", {"H": 0.25, "L": 0.75}).methods
     assert mixed["ours"] == pytest.approx(0.25 * high["ours"] + 0.75 * low["ours"])
-    assert set(ask(knowledge, mug, "to_pour", None).levels) == {"H", "H-M", "L-M", "L"}
+    assert set(ask(knowledge, mug, "to_pour", "unknown").levels) == {"H", "H-M", "L-M", "L"}
 
 
 @pytest.mark.parametrize("level", ["Q", {"L": 0.7}, {"L": 1.5, "H": -0.5}])
@@ -91,7 +92,7 @@ def test_reasons_add_up_to_the_log_odds(knowledge):
 
     mug = read_object("mug")
     answer = ask(knowledge, mug, "to_pour", "L")
-    reasons = explain(knowledge, mug, "to_pour", "L", answer)
+    reasons = explain(knowledge, mug, "to_pour", answer)
     for predicate, probabilities in (("handover", answer.methods), ("graspRegion", answer.regions)):
         first, second = list(probabilities.values())[:2]
         assert sum(r.log_odds for r in reasons if r.predicate == predicate) == pytest.approx(
@@ -101,7 +102,7 @@ def test_reasons_add_up_to_the_log_odds(knowledge):
 
 
 def test_advice_has_poses_and_words(knowledge):
-    advice = advise(knowledge, read_object("mug"), "to_pour", "L")
+    advice = advise(knowledge, make_scene("mug", "to_pour", "L"))
     assert advice.configuration is not None
     assert advice.configuration.method == "ours"
     text = advice_text(advice, certify(knowledge, advice.thing, "to_pour", "L"))

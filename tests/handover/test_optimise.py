@@ -14,6 +14,7 @@ from mlnlite import MlnError
 from mlnlite.domains.handover.checks import CHECKS, five_checks, receiver_effort, violations
 from mlnlite.domains.handover.collision import clearance, is_free, touching
 from mlnlite.domains.handover.costs import Limits
+from mlnlite.domains.handover.feasibility import default_solver
 from mlnlite.domains.handover.fields import Options
 from mlnlite.domains.handover.methods import METHODS, hand_over
 from mlnlite.domains.handover.objects import object_names, read_object
@@ -56,6 +57,19 @@ def test_best_first_is_exhaustive_and_sound(seed):
     assert np.array_equal(a.hold.q, b.hold.q)
     assert fast.bound == a.reach
     assert violations(scene, a, options) == ()
+
+
+@pytest.mark.parametrize("cost", ["C_A", "C_S", "C_R"])
+def test_without_a_cost_the_others_fare_no_worse(cost):
+    for seed in (3, 5):
+        scene, options = random_scene(seed), replace(SMALL, grasps=1, without=(cost,))
+        fast, slow = optimise(scene, options), optimise(scene, options, exhaustive=True)
+        a, b = fast.configuration, slow.configuration
+        assert (a.voxel, a.orientation, a.grasp) == (b.voxel, b.orientation, b.grasp)
+        whole = optimise(scene, replace(SMALL, grasps=1)).configuration
+        assert cost != "C_A" or a.appropriateness <= whole.appropriateness
+        assert cost != "C_S" or a.reach <= whole.reach
+        assert cost != "C_R" or a.safety >= whole.safety
 
 
 def test_most_random_scenes_are_feasible():
@@ -137,9 +151,18 @@ def test_other_processes_give_the_same_bits():
 
 
 def test_the_limit_of_calls_is_a_status_with_a_bound():
-    scene = make_scene("plate", robot="panda")
-    stopped, whole = optimise(scene, Options(ik_calls=3)), optimise(scene)
-    assert whole.ik_calls > 3
+    """A solver that finds nothing at first: the search stops at the limit, or goes on to the end."""
+    scene, asked = make_scene("plate", robot="panda"), []
+
+    def late(target, accept=None):
+        asked.append(1)
+        found = default_solver(scene.robot.chain)(target, accept)
+        return found if len(asked) > 20 else replace(found, found=False)
+
+    stopped = optimise(scene, Options(solver=late, ik_calls=3))
+    asked.clear()
+    whole = optimise(scene, Options(solver=late))
+    assert whole.ik_calls > 20
     assert stopped.status == "limit"
     assert stopped.bound <= whole.configuration.reach
     assert "within 3 calls" in str(stopped.advice[0])

@@ -51,7 +51,7 @@ def test_value_and_gradient(text, first, second):
         slope = (likelihood.at(found, weights + shift).value - likelihood.at(found, weights - shift).value) / 2 / step
         assert point.gradient[i] == pytest.approx(slope, abs=1e-5)
         bend = (likelihood.at(found, weights + shift).gradient - likelihood.at(found, weights - shift).gradient) / -2
-        assert likelihood.curvature(found, point, np.eye(n)[i]) == pytest.approx(bend / step, abs=1e-5)
+        assert likelihood.curvature(found, point)(np.eye(n)[i]) == pytest.approx(bend / step, abs=1e-5)
 
 
 @settings(max_examples=25, deadline=None)

@@ -9,21 +9,24 @@ from matplotlib.figure import Figure
 
 from mlnlite.domains.handover.evaluation.grasp_choice import Choice
 from mlnlite.domains.handover.evaluation.metrics import reliability
-from mlnlite.domains.handover.evaluation.protocol import MEASURES, Split
+from mlnlite.domains.handover.evaluation.protocol import MEASURES, MODELS, Split
+from mlnlite.domains.handover.evaluation.protocol_tables import shares
 from mlnlite.domains.handover.evaluation.real import OURS, HeldOut
 
 
 def draw_protocol(found: Mapping[str, Sequence[Split]]) -> Figure:
-    """Distribution over splits of every measure, one panel for each way to label."""
-    figure = Figure(figsize=(11, 4.2))
+    """Distribution over splits of what every model gets right on synthetic rows, one panel for each way to label."""
+    figure = Figure(figsize=(11, 4.6))
+    lines = [("ours", measure) for measure in MEASURES] + [(model, "pose and grasp") for model in MODELS[1:]]
     for axis, (labels, splits) in zip(
         np.atleast_1d(figure.subplots(1, len(found), sharey=True)), found.items(), strict=True
     ):
-        values = [[100 * s.scores[m, "all", "all"][0] / s.scores[m, "all", "all"][1]
-                   for s in splits if (m, "all", "all") in s.scores] for m in MEASURES]  # fmt: skip
+        values = [shares(splits, (model, measure, "synthetic", "all")) for model, measure in lines]
         axis.boxplot(values, orientation="horizontal", whis=(2.5, 97.5), showfliers=False)
-        axis.set(title=f"labels {labels}", xlabel="rows right on 10 unseen objects [%]", xlim=(0, 102),
-                 yticks=range(1, len(MEASURES) + 1), yticklabels=MEASURES)  # fmt: skip
+        axis.set(title=f"labels {labels}", xlabel="synthetic rows right on 10 unseen objects [%]", xlim=(0, 102),
+                 yticks=range(1, len(lines) + 1), yticklabels=[f"{model}, {measure}" for model, measure in lines],
+                 )  # fmt: skip
+        axis.invert_yaxis()
     return figure
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,9 +49,7 @@ def calibration_error(labels: Index, probabilities: Float, *, bins: int = 10) ->
     return float(sum(gaps) / len(labels))
 
 
-def cluster_interval(
-    values: Float, groups: Sequence[str], *, seed: int = 0, n: int = 2000, of: Callable[[Float], Float] | None = None
-) -> tuple[float, float]:
+def cluster_interval(values: Float, groups: Sequence[str], *, seed: int = 0, n: int = 2000) -> tuple[float, float]:
     """95 % interval of the mean of values, by bootstrap over whole groups.
 
     Args:
@@ -59,13 +57,27 @@ def cluster_interval(
         groups: of each value; rows of a group are not independent.
         seed: of the draws.
         n: bootstrap samples.
-        of: applied to the means, if something else of them is wanted.
     """
     names, place = np.unique(np.asarray(groups), return_inverse=True)
     sums, sizes = np.bincount(place, values), np.bincount(place)
     draws = np.random.default_rng(seed).integers(len(names), size=(n, len(names)))
     means = sums[draws].sum(axis=1) / sizes[draws].sum(axis=1)
-    low, high = np.percentile(means if of is None else of(means), [2.5, 97.5])
+    low, high = np.percentile(means, [2.5, 97.5])
+    return float(low), float(high)
+
+
+def balanced_interval(
+    labels: Index, probabilities: Float, groups: Sequence[str], *, seed: int = 0, n: int = 2000
+) -> tuple[float, float]:
+    """95 % interval of the balanced accuracy, by bootstrap over whole groups; classes not drawn do not count."""
+    names, place = np.unique(np.asarray(groups), return_inverse=True)
+    right, classes = credit(labels, probabilities), np.unique(labels)
+    sums = np.array([np.bincount(place[labels == c], right[labels == c], len(names)) for c in classes])
+    sizes = np.array([np.bincount(place[labels == c], minlength=len(names)) for c in classes])
+    draws = np.random.default_rng(seed).integers(len(names), size=(n, len(names)))
+    drawn = sizes[:, draws].sum(axis=2)
+    shares = np.where(drawn > 0, sums[:, draws].sum(axis=2) / np.maximum(drawn, 1), np.nan)
+    low, high = np.percentile(np.nanmean(shares, axis=0), [2.5, 97.5])
     return float(low), float(high)
 
 

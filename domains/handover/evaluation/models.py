@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mlnlite as ml
-from mlnlite.domains.handover.knowledge.facts import THING, Fact, kept
+from mlnlite.domains.handover.knowledge.facts import THING, Fact, about_receiver, gathered_text, kept
 from mlnlite.domains.handover.knowledge.train import train
-from mlnlite.domains.handover.knowledge.words import known_predicates
+from mlnlite.domains.handover.knowledge.words import asked_predicates, known_predicates
 
 Float = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def logistic_pairwise(training: Sequence[Row], tests: Sequence[Row], question: Q
 def predicted(
     model: ml.Model, prior: float | None, training: Sequence[Row], tests: Sequence[Row], questions: Sequence[Question]
 ) -> dict[str, Float]:
-    """Probabilities by a Markov logic model, for each question; equal test rows are asked once.
+    """Probabilities by a Markov logic model, for each question.
 
     Args:
         model: without weights.
@@ -128,25 +128,35 @@ def predicted(
         questions: what is predicted.
     """
     instances = [(*row.known, *((name, THING, label) for name, label in row.labels)) for row in training]
-    learned = train(model, instances, prior=prior).model
-    known = known_predicates(learned)
-    asked = [q.predicate for q in questions if q.predicate in learned.predicates]
-    session = ml.compile(learned, query=asked, evidence_predicates=known, constants=_constants(learned, tests))
-    answers: dict[tuple[Fact, ...], ml.Marginals] = {}
-    for row in tests:
-        facts = kept(row.known, known)
-        if facts not in answers:
-            answers[facts] = session.query(facts)
-    found = [answers[kept(row.known, known)] for row in tests]
-    return {q.predicate: np.array([[a.get(f"{q.predicate}({THING}, {c})", 0.0) for c in q.classes] for a in found])
-            for q in questions if q.predicate in asked}  # fmt: skip
+    found = answer_all(train(model, instances, prior=prior).model, [row.known for row in tests])
+    return {q.predicate: np.array([[a[q.predicate].get(c, 0.0) for c in q.classes] for a in found])
+            for q in questions if q.predicate in model.predicates}  # fmt: skip
 
 
-def _constants(model: ml.Model, tests: Sequence[Row]) -> dict[str, list[str]]:
-    """Constants that the test rows use, by type."""
-    out: dict[str, set[str]] = {}
-    for row in tests:
-        for name, *arguments in kept(row.known, known_predicates(model)):
-            for kind, constant in zip(model.predicates[name].types, arguments, strict=True):
-                out.setdefault(kind, set()).add(constant)
-    return {kind: sorted(names) for kind, names in out.items()}
+def answer_all(model: ml.Model, instances: Sequence[Sequence[Fact]]) -> list[dict[str, dict[str, float]]]:
+    """Of each instance the probability of each value of what is asked, by predicate.
+
+    One inference answers all instances that share the facts about their receiver: no formula of the domain speaks of
+    two objects. Equal instances are asked once.
+    """
+    known, asked = known_predicates(model), asked_predicates(model)
+    groups: dict[tuple[Fact, ...], dict[tuple[Fact, ...], None]] = defaultdict(dict)
+    rows = [kept(facts, known) for facts in instances]
+    for facts in rows:
+        groups[about_receiver(facts)][facts] = None
+    answers: dict[tuple[Fact, ...], dict[str, dict[str, float]]] = {}
+    for group in groups.values():
+        evidence = ml.evidence_from_text(gathered_text(list(group)), model=model)
+        found = ml.marginal(model, evidence, asked, closed_world=known)
+        answers |= zip(group, _by_thing(found, len(group), asked), strict=True)
+    return [answers[facts] for facts in rows]
+
+
+def _by_thing(found: ml.Marginals, n: int, asked: Sequence[str]) -> list[dict[str, dict[str, float]]]:
+    """Probabilities of atoms such as `handover(x7, ours)`, sorted by thing, predicate and value."""
+    out: list[dict[str, dict[str, float]]] = [{name: {} for name in asked} for _ in range(n)]
+    for atom, p in zip(found.names, found.probabilities.tolist(), strict=True):
+        predicate, _, arguments = atom.rstrip(")").partition("(")
+        thing, value = arguments.split(", ")
+        out[int(thing.removeprefix(THING))][predicate][value] = p
+    return out

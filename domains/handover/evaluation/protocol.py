@@ -10,16 +10,18 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
+from itertools import product
 
 import numpy as np
 
 import mlnlite as ml
+from mlnlite.domains.handover.evaluation.models import answer_all
 from mlnlite.domains.handover.instances.generate import Instance, facts_of
 from mlnlite.domains.handover.instances.poses import Cell, MeanPose, Placed, quaternion_angles, templates
-from mlnlite.domains.handover.knowledge.facts import THING, Fact, fact_text, kept, level_facts, object_facts
+from mlnlite.domains.handover.knowledge.facts import level_facts, object_facts
 from mlnlite.domains.handover.knowledge.train import train
-from mlnlite.domains.handover.knowledge.words import ASKED, METHODS, known_predicates, method_name, read_knowledge
+from mlnlite.domains.handover.knowledge.words import METHODS, method_name, read_knowledge
 from mlnlite.domains.handover.objects import object_names, read_object
 from mlnlite.domains.handover.pose import FloatArray
 from mlnlite.domains.handover.study.preferences import published
@@ -27,11 +29,16 @@ from mlnlite.domains.handover.study.preferences import published
 PAPER_TEST = ("shoe", "stapler", "camera", "bowl", "plate", "sunglasses", "toothbrush", "marker", "flashlight", "glass")
 TOLERANCE = (0.005, np.radians(2.0))
 """The paper's: 5 mm and 2 degrees."""
-MEASURES = ("method", "region", "pose", "grasp", "pose and grasp", "pose from template", "chance", "majority",
-            "look-up", "paper's conjunction", "ceiling")  # fmt: skip
+MEASURES = ("method", "region", "pose", "grasp", "pose and grasp")
 """`pose` is the object's pose and `grasp` the tool's pose in the object, both by the cost model for what was predicted,
-within tolerance of those for the label; `pose from template` takes the mean pose of shape and method in training. The
-last five are of the method."""
+within tolerance of those for the label."""
+MODELS = ("ours", "paper's conjunction", "look-up", "majority", "chance", "ceiling")
+TEMPLATE = "mean pose of the shape"
+"""Ours, but with the mean pose of shape and method over the training objects; measured in `pose` only."""
+Asked = tuple[str, str, str]
+"""An object, a task and a level."""
+Answer = tuple[int, str]
+"""A region, from 1, and a method."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +47,13 @@ class Split:
 
     Attributes:
         test: the objects left out.
-        scores: rows right and rows in all, by measure, source of rows, and shape.
+        scores: rows right and rows in all, by model, measure, source of rows, and shape or `all`.
+        answers: ours.
     """
 
     test: tuple[str, ...]
-    scores: Mapping[tuple[str, str, str], tuple[float, int]]
+    scores: Mapping[tuple[str, str, str, str], tuple[float, int]]
+    answers: Mapping[Asked, Answer]
 
 
 def splits(n: int, *, seed: int = 0) -> tuple[tuple[str, ...], ...]:
@@ -69,84 +78,76 @@ def run_split(instances: Sequence[Instance], placed: Mapping[Cell, Placed], test
     """Trains without the test objects, then predicts their rows."""
     training = [row for row in instances if row.thing not in test]
     learned = train(read_knowledge(), facts_of(training)).model
-    asked = sorted({(row.thing, row.task, row.level) for row in instances if row.thing in test})
-    answers = answer_all(learned, asked)
-    means = templates(placed, {n: read_object(n).shape for n in object_names() if n not in test})
-    rivals = _rivals(training)
-    scores: dict[tuple[str, str, str], list[float]] = defaultdict(lambda: [0.0, 0.0])
+    answers = predictions(learned, sorted({_asked(row) for row in instances if row.thing in test}))
+    shapes = {name: read_object(name).shape for name in object_names()}
+    means = templates(placed, {name: shape for name, shape in shapes.items() if name not in test})
+    rivals, near = _rivals(training), cache(partial(_near, placed))
+    scores: dict[tuple[str, str, str, str], list[float]] = defaultdict(lambda: [0.0, 0.0])
     for row in instances:
         if row.thing in test:
-            shape = read_object(row.thing).shape
-            right = _judged(row, answers[row.thing, row.task, row.level], placed, means) | rivals(row)
-            for measure, value in right.items():
-                for place in ((measure, row.source, shape), (measure, row.source, "all"), (measure, "all", "all")):
+            found = {"ours": [answers[_asked(row)]]} | rivals(row)
+            values = {(model, m): v for model, tied in found.items() for m, v in _judged(row, tied, near).items()}
+            values |= _by_template(row, answers[_asked(row)], placed, means)
+            for key, value in values.items():
+                for place in ((*key, row.source, shapes[row.thing]), (*key, row.source, "all")):
                     scores[place][0] += value
                     scores[place][1] += 1
-    return Split(test, {key: (right, int(n)) for key, (right, n) in scores.items()})
+    return Split(test, {key: (right, int(n)) for key, (right, n) in scores.items()}, answers)
 
 
-def answer_all(model: ml.Model, asked: Sequence[tuple[str, str, str]]) -> dict[tuple[str, str, str], tuple[int, str]]:
-    """Most probable region (from 1) and method for each object, task and level; one inference for each level."""
-    out = {}
-    for level in sorted({key[2] for key in asked}):
-        chosen = [key for key in asked if key[2] == level]
-        facts: list[Fact] = list(level_facts(level))
-        for i, (thing, task, _) in enumerate(chosen):
-            known = kept(object_facts(read_object(thing), task), known_predicates(model))
-            facts += [(name, f"{THING}{i}", *rest) for name, _, *rest in known]
-        text = "".join(f"{fact_text(fact)}\n" for fact in facts)
-        evidence = ml.evidence_from_text(text, model=model)
-        found = ml.marginal(model, evidence, ASKED, closed_world=known_predicates(model))
-        best = _best(found)
-        out.update({key: (int(best["graspRegion", f"{THING}{i}"]), method_name(best["handover", f"{THING}{i}"]))
-                    for i, key in enumerate(chosen)})  # fmt: skip
+def _asked(row: Instance) -> Asked:
+    return row.thing, row.task, row.level
+
+
+def predictions(model: ml.Model, asked: Sequence[Asked]) -> dict[Asked, Answer]:
+    """Most probable region and method."""
+    facts = [object_facts(read_object(thing), task) + level_facts(level) for thing, task, level in asked]
+    best = [{name: max(p, key=p.__getitem__) for name, p in answer.items()} for answer in answer_all(model, facts)]
+    return {key: (int(one["graspRegion"]), method_name(one["handover"])) for key, one in zip(asked, best, strict=True)}
+
+
+_Near = Callable[[Cell, Cell], tuple[float, float] | None]
+
+
+def _judged(row: Instance, tied: Sequence[Answer], near: _Near) -> dict[str, float]:
+    """What of an answer is right; answers that a model holds equally good share the credit."""
+    wanted, out = _cell(row, (row.region, row.method)), defaultdict[str, float](float)
+    for answer in tied:
+        out["region"] += (answer[0] == row.region) / len(tied)
+        out["method"] += (answer[1] == row.method) / len(tied)
+        right = near(_cell(row, answer), wanted)
+        if right is not None:
+            for name, value in zip(("pose", "grasp", "pose and grasp"), (*right, right[0] * right[1]), strict=True):
+                out[name] += value / len(tied)
     return out
 
 
-def _best(found: ml.Marginals) -> dict[tuple[str, str], str]:
-    """Most probable value of each predicate and object."""
-    best: dict[tuple[str, str], tuple[float, str]] = {}
-    for name, p in zip(found.names, found.probabilities.tolist(), strict=True):
-        predicate, _, rest = name.rstrip(")").partition("(")
-        thing, value = rest.split(", ")
-        if p > best.get((predicate, thing), (-1.0, ""))[0]:
-            best[predicate, thing] = (p, value)
-    return {key: value for key, (_, value) in best.items()}
-
-
-Means = Mapping[tuple[str, str], MeanPose]
-
-
-def _judged(row: Instance, answer: tuple[int, str], placed: Mapping[Cell, Placed], means: Means) -> dict[str, float]:
-    """What of an answer is right."""
+def _cell(row: Instance, answer: Answer) -> Cell:
     region, method = answer
-    right = {"method": float(method == row.method), "region": float(region == row.region)}
-    wanted = placed.get(_cell(row.thing, row.region, row.level, row.method))
-    if wanted is None or wanted.status != "optimal":
-        return right
-    found = placed.get(_cell(row.thing, region, row.level, method))
-    pose, grasp = _near(found, wanted)
-    mean = means.get((read_object(row.thing).shape, method))
-    right |= {"pose": pose, "grasp": grasp, "pose and grasp": pose * grasp}
-    return right | {"pose from template": _mean_near(mean, wanted)}
+    return Cell(row.thing, region, row.level if method == "ours" else "", method)
 
 
-def _cell(thing: str, region: int, level: str, method: str) -> Cell:
-    return Cell(thing, region, level if method == "ours" else "", method)
-
-
-def _near(found: Placed | None, wanted: Placed) -> tuple[float, float]:
-    if found is None or found.status != "optimal":
+def _near(placed: Mapping[Cell, Placed], found: Cell, wanted: Cell) -> tuple[float, float] | None:
+    """Whether pose and grasp of a cell are those of another; None if that one has none."""
+    a, b = placed.get(found), placed.get(wanted)
+    if b is None or b.status != "optimal":
+        return None
+    if a is None or a.status != "optimal":
         return 0.0, 0.0
-    pose = is_near((found.position, found.quaternion), (wanted.position, wanted.quaternion))
-    grasp = is_near((found.grasp_position, found.grasp_quaternion), (wanted.grasp_position, wanted.grasp_quaternion))
+    pose = is_near((a.position, a.quaternion), (b.position, b.quaternion))
+    grasp = is_near((a.grasp_position, a.grasp_quaternion), (b.grasp_position, b.grasp_quaternion))
     return float(pose), float(grasp)
 
 
-def _mean_near(mean: MeanPose | None, wanted: Placed) -> float:
-    if mean is None:
-        return 0.0
-    return float(is_near((mean.position, mean.quaternion), (wanted.position, wanted.quaternion)))
+def _by_template(
+    row: Instance, answer: Answer, placed: Mapping[Cell, Placed], means: Mapping[tuple[str, str], MeanPose]
+) -> dict[tuple[str, str], float]:
+    wanted = placed.get(_cell(row, (row.region, row.method)))
+    mean = means.get((read_object(row.thing).shape, answer[1]))
+    if wanted is None or wanted.status != "optimal" or mean is None:
+        return {}
+    right = is_near((mean.position, mean.quaternion), (wanted.position, wanted.quaternion))
+    return {(TEMPLATE, "pose"): float(right)}
 
 
 _PoseArrays = tuple[FloatArray, FloatArray]
@@ -158,30 +159,28 @@ def is_near(first: _PoseArrays, second: _PoseArrays) -> bool:
     return distance <= TOLERANCE[0] and float(quaternion_angles(first[1], second[1])) <= TOLERANCE[1]
 
 
-_Shares = dict[str, float]
-
-
-def _rivals(training: Sequence[Instance]) -> Callable[[Instance], _Shares]:
-    """What simpler guesses of the method score on a row; ties share the credit."""
-    everyone = Counter(row.method for row in training)
-    cells: dict[tuple[str, ...], Counter[str]] = defaultdict(Counter)
+def _rivals(training: Sequence[Instance]) -> Callable[[Instance], dict[str, list[Answer]]]:
+    """What simpler guesses answer about a row, all that they hold equally good; and the best that can be known."""
+    everyone = Counter((row.region, row.method) for row in training)
+    cells: dict[tuple[str, ...], Counter[Answer]] = defaultdict(Counter)
     for row in training:
-        cells[_features(row)][row.method] += 1
+        cells[_features(row)][row.region, row.method] += 1
     table = published()
     best_of_level = {level: table.methods[int(counts.argmax())]
                      for level, counts in zip(table.levels, table.counts, strict=True)}  # fmt: skip
 
-    def score(row: Instance) -> _Shares:
+    def answers(row: Instance) -> dict[str, list[Answer]]:
         cell = cells.get(_features(row), Counter())
+        anything = list(product(range(1, len(read_object(row.thing).regions) + 1), METHODS))
         return {
-            "chance": 1 / len(METHODS),
-            "majority": _credit(everyone, row.method),
-            "look-up": _credit(cell or everyone, row.method),
-            "paper's conjunction": _credit(cell, row.method),
-            "ceiling": float(best_of_level[row.level] == row.method),
+            "paper's conjunction": _most(cell) or anything,
+            "look-up": _most(cell) or _most(everyone),
+            "majority": _most(everyone),
+            "chance": anything,
+            "ceiling": [(row.region, best_of_level[row.level])],
         }
 
-    return score
+    return answers
 
 
 def _features(row: Instance) -> tuple[str, ...]:
@@ -189,7 +188,7 @@ def _features(row: Instance) -> tuple[str, ...]:
     return thing.shape, thing.category, row.task, row.level
 
 
-def _credit(counts: Mapping[str, int], label: str) -> float:
-    """Share of the credit if the most frequent are guessed; of nothing, every method is as good."""
-    top = [name for name in METHODS if counts.get(name, 0) == max(counts.values(), default=0)]
-    return float(label in top) / len(top)
+def _most(counts: Mapping[Answer, int]) -> list[Answer]:
+    """The most frequent ones."""
+    top = max(counts.values(), default=0)
+    return [answer for answer, n in counts.items() if n == top]

@@ -9,7 +9,7 @@ given and the row has a counterpart.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from pathlib import Path
@@ -19,7 +19,8 @@ from mlnlite.domains.handover.knowledge.facts import THING, Fact
 
 _REGIONS = {"3-2": "3", "23": "2"}
 _METHODS = ("far", "midway", "ours")
-_LOOKS = ("hasMaterial", "hasTexture", "canBeFound")
+LOOKS = ("hasMaterial", "hasTexture", "canBeFound")
+"""What only the 2019 file tells of a row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,7 @@ def _aligned(rows: Sequence[dict[str, str]], path: Path) -> list[tuple[tuple[str
     for block in SequenceMatcher(None, first, second, autojunk=False).get_matching_blocks():
         for k in range(block.size):
             found = others[block.b + k]
-            looks[block.a + k] = tuple((name, found[name]) for name in _LOOKS if name in found)
+            looks[block.a + k] = tuple((name, found[name]) for name in LOOKS if name in found)
     return looks
 
 
@@ -108,9 +109,9 @@ def _key(row: dict[str, str]) -> tuple[str, ...]:
     return tuple(row.get(name, "") for name in ("hasShape", "isA", "hasAffordance", "graspRegion"))
 
 
-def known_facts(row: PublishedRow, *, looks: bool = True, level: bool = True) -> tuple[Fact, ...]:
-    """What is known of a row as facts, with or without looks and level."""
-    facts: list[Fact] = [(name, THING, value) for name, value in row.known if looks or name not in _LOOKS]
+def known_facts(row: PublishedRow, *, without: Collection[str] = (), level: bool = True) -> tuple[Fact, ...]:
+    """What is known of a row as facts, without some predicates, with or without the level."""
+    facts: list[Fact] = [(name, THING, value) for name, value in row.known if name not in without]
     return (*facts, ("armMobility", row.level)) if level and row.level else tuple(facts)
 
 

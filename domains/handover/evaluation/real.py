@@ -6,7 +6,8 @@ out whole groups as the outer one does; the test half never plays a part.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -16,14 +17,14 @@ import numpy as np
 from mlnlite.domains.handover.evaluation import models
 from mlnlite.domains.handover.evaluation.metrics import log_loss
 from mlnlite.domains.handover.evaluation.models import Float, Question, Row
-from mlnlite.domains.handover.evaluation.published import PublishedRow, blocks, keys, known_facts, labels
+from mlnlite.domains.handover.evaluation.published import LOOKS, PublishedRow, blocks, keys, known_facts, labels
 from mlnlite.domains.handover.evaluation.schemes import grouped_folds
+from mlnlite.domains.handover.knowledge.facts import Fact, kept
 from mlnlite.domains.handover.knowledge.words import read_knowledge
 
 _BASE = ("hasShape", "isA", "hasAffordance")
-_LOOKS = ("hasMaterial", "hasTexture", "canBeFound")
-REGION = Question("graspRegion", ("1", "2", "3"), _BASE + _LOOKS)
-METHOD = Question("handover", ("far", "midway", "ours"), _BASE + _LOOKS + ("armMobility",))
+REGION = Question("graspRegion", ("1", "2", "3"), _BASE + LOOKS)
+METHOD = Question("handover", ("far", "midway", "ours"), _BASE + LOOKS + ("armMobility",))
 GRID: tuple[tuple[str, float], ...] = (("backoff", 0.1), ("backoff", 0.15), ("backoff", 0.3), ("pairs", 0.2),
                                        ("pairs", 0.4))  # fmt: skip
 """Templates and standard deviations of the prior that the inner cross-validation chooses from, for the method; the
@@ -44,24 +45,28 @@ class HeldOut:
         question: what was predicted.
         truth: class of each row, shape (n,).
         groups: what was held out together.
+        folds: number of the fold that held each row out, shape (n,).
         found: probabilities by model, shape (n, classes).
         chosen: how often each entry of the grid was chosen.
+        memory: accuracy of the best rule of the known facts on rows that it has seen.
     """
 
     scheme: str
     question: Question
     truth: np.ndarray
     groups: tuple[str, ...]
+    folds: np.ndarray
     found: Mapping[str, Float]
     chosen: Mapping[str, int]
+    memory: float
 
 
-def rows_of(published: Sequence[PublishedRow], *, looks: bool = True, levels: str = "filled") -> list[Row]:
-    """Rows for the models, with or without material, texture and environment; see `LEVELS`."""
+def rows_of(published: Sequence[PublishedRow], *, without: Collection[str] = (), levels: str = "filled") -> list[Row]:
+    """Rows for the models, without some predicates; see `LEVELS`."""
     out = []
     for row in published:
         known = levels == "filled" or (levels == "unknown where missing" and not row.gap)
-        facts = known_facts(row, looks=looks, level=known)
+        facts = known_facts(row, without=without, level=known)
         out.append(Row(facts, tuple((name, value) for name, _, value in labels(row))))
     return out
 
@@ -133,9 +138,19 @@ def _gathered(
     scheme: str, question: Question, rows: Sequence[Row], groups: Sequence[str], parts: Sequence[_Part]
 ) -> HeldOut:
     found = {name: np.zeros((len(rows), len(question.classes))) for name in (*BASELINES, OURS)}
-    chosen: dict[str, int] = {}
-    for test, answers, choice in parts:
+    chosen, folds = Counter[str](), np.zeros(len(rows), dtype=np.int64)
+    for number, (test, answers, choice) in enumerate(parts):
+        folds[test] = number
         for name, probabilities in found.items():
             probabilities[test] = answers[question.predicate, name]
-        chosen[choice[question.predicate]] = chosen.get(choice[question.predicate], 0) + 1
-    return HeldOut(scheme, question, _truth(rows, question), tuple(groups), found, chosen)
+        chosen[choice[question.predicate]] += 1
+    return HeldOut(scheme, question, _truth(rows, question), tuple(groups), folds, found, chosen,
+                   _memory(rows, question))  # fmt: skip
+
+
+def _memory(rows: Sequence[Row], question: Question) -> float:
+    """Share of rows that have the most frequent label of all rows with equal facts."""
+    cells: dict[tuple[Fact, ...], Counter[str]] = defaultdict(Counter)
+    for row in rows:
+        cells[kept(row.known, question.given)][row.label(question.predicate)] += 1
+    return sum(max(counts.values()) for counts in cells.values()) / len(rows)

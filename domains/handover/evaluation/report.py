@@ -8,10 +8,13 @@ from pathlib import Path
 from time import monotonic
 
 from mlnlite.domains.handover.evaluation import figures, tables
+from mlnlite.domains.handover.evaluation.goals import goals_section
 from mlnlite.domains.handover.evaluation.grasp_choice import compare_grasps
+from mlnlite.domains.handover.evaluation.predictions import write_rows, write_splits
 from mlnlite.domains.handover.evaluation.protocol import Split, run_splits
-from mlnlite.domains.handover.evaluation.published import read_published
-from mlnlite.domains.handover.evaluation.quality import measure, quality_table
+from mlnlite.domains.handover.evaluation.protocol_tables import ablation_of_roles, protocol_section
+from mlnlite.domains.handover.evaluation.published import PublishedRow, read_published
+from mlnlite.domains.handover.evaluation.quality import measure, quality_section
 from mlnlite.domains.handover.evaluation.real import HeldOut, held_out
 from mlnlite.domains.handover.figures import save
 from mlnlite.domains.handover.instances.generate import LABELS, generate
@@ -43,13 +46,14 @@ _HEAD = """# Evaluation
 
 Written by `mlnlite handover evaluate --splits {splits}{data} --out docs/handover/evaluation`; do not edit.
 
-Data made by the cost model and data published by the authors are never pooled. The authors' 1,657 instances, their
+Three kinds of rows are never pooled in one number: rows of the study (the published counts of preferences, with objects
+and tasks drawn by us), synthetic rows, and the rows that the authors published. The authors' 1,657 instances, their
 poses and their survey are not published, so nothing here repeats their 90.8 %.
 """
 
 
 def write_report(asked: Asked, folder: Path, say: Callable[[str], None]) -> str:
-    """Writes `index.md` and its figures; returns where.
+    """Writes `index.md`, its figures, and what was predicted; returns where.
 
     Args:
         asked: what to evaluate.
@@ -58,41 +62,52 @@ def write_report(asked: Asked, folder: Path, say: Callable[[str], None]) -> str:
     """
     folder.mkdir(parents=True, exist_ok=True)
     start = monotonic()
-    parts = [_HEAD.format(splits=asked.splits, data=" --data PATH" if asked.data else "")]
-    parts.append(_protocol(asked, folder, say))
-    parts.append(tables.ablation_of_roles(generate("preferred", seed=asked.seed)))
-    say(f"{monotonic() - start:.0f} s: models without parts of the knowledge")
+
+    def told(stage: str) -> None:
+        say(f"{monotonic() - start:4.0f} s: {stage}")
+
+    protocol = _protocol(asked, folder, told)
+    parts = [protocol_section(protocol)]
+    parts.append(ablation_of_roles(generate("preferred", seed=asked.seed), workers=asked.workers))
+    told("models without parts of the knowledge")
+    real: Sequence[HeldOut] = ()
     if asked.data:
-        parts.append(_real(asked, asked.data, folder))
-        say(f"{monotonic() - start:.0f} s: the authors' rows")
+        rows = read_published(asked.data)
+        real = _real(rows, asked, folder)
+        parts.append(tables.real_section(real) + tables.cells_section(rows))
+        told("the authors' rows")
+        parts.append(tables.real_ablation(rows, workers=asked.workers))
+        told("the authors' rows, parts of the knowledge left out")
     if asked.quality:
-        parts.append(tables.QUALITY + quality_table(measure(workers=asked.workers)) + "\n")
-        say(f"{monotonic() - start:.0f} s: quality of handovers")
+        names = object_names()
+        parts.append(quality_section(measure(names, workers=asked.workers), len(names)))
+        told("quality of handovers")
     choices = compare_grasps([read_object(name) for name in object_names()])
     save(figures.draw_grasps(choices), folder / "grasps.png")
-    parts.append(tables.grasp_section(choices))
-    (folder / "index.md").write_text("\n".join(parts), encoding="utf-8")
+    head = _HEAD.format(splits=asked.splits, data=" --data PATH" if asked.data else "")
+    whole = [head, goals_section(protocol, real), *parts, tables.grasp_section(choices)]
+    (folder / "index.md").write_text("\n".join(whole), encoding="utf-8")
     return f"written: {folder / 'index.md'} after {monotonic() - start:.0f} s"
 
 
-def _protocol(asked: Asked, folder: Path, say: Callable[[str], None]) -> str:
-    start = monotonic()
+def _protocol(asked: Asked, folder: Path, told: Callable[[str], None]) -> dict[str, Sequence[Split]]:
     things = [read_object(name) for name in object_names()]
     placed: dict[Cell, Placed] = place_all(all_cells(things, [x.name for x in read_levels()]), workers=asked.workers)
-    say(f"{monotonic() - start:.0f} s: poses of {len(placed)} cells")
+    told(f"poses of {len(placed)} cells")
     found: dict[str, Sequence[Split]] = {}
     for labels in LABELS:
         rows = generate(labels, seed=asked.seed)
         found[labels] = run_splits(rows, placed, asked.splits, seed=asked.seed, workers=asked.workers)
-        say(f"{monotonic() - start:.0f} s: {asked.splits} splits, labels {labels}")
+        told(f"{asked.splits} splits, labels {labels}")
     save(figures.draw_protocol(found), folder / "splits.png")
-    return tables.protocol_section(found)
+    write_splits(found, folder / "splits.parquet")
+    return found
 
 
-def _real(asked: Asked, data: Path, folder: Path) -> str:
-    rows = read_published(data)
+def _real(rows: Sequence[PublishedRow], asked: Asked, folder: Path) -> Sequence[HeldOut]:
     found: list[HeldOut] = []
     for scheme in ("key", "block"):
         found += held_out(rows, scheme, seed=asked.seed, workers=asked.workers)
     save(figures.draw_calibration(found), folder / "calibration.png")
-    return tables.real_section(found) + tables.cells_section(rows) + tables.real_ablation(rows)
+    write_rows(found, folder / "rows.parquet")
+    return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -45,8 +44,3 @@ def _evenest(filled: NDArray[np.float64], group: NDArray[np.float64], total: NDA
         grown[fold] += group
         costs.append((float((grown / total).std(axis=0).mean()), float(filled[fold].sum()), fold))
     return min(costs)[2]
-
-
-def group_sizes(groups: Sequence[str]) -> int:
-    """How many groups there are."""
-    return len(Counter(groups))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mlnlite as ml
-from mlnlite.domains.handover.fields import Options
-from mlnlite.domains.handover.knowledge.ask import Answer, Knowledge, Level, ask, explain
+from mlnlite.domains.handover.knowledge.ask import Answer, Knowledge, Level, ask, explain, likeliest
 from mlnlite.domains.handover.knowledge.reasons import Reason, said
 from mlnlite.domains.handover.knowledge.words import LEVELS, METHODS, words_table
 from mlnlite.domains.handover.methods import hand_over
 from mlnlite.domains.handover.objects import HandoverObject
-from mlnlite.domains.handover.scene import Scene, make_scene
+from mlnlite.domains.handover.scene import Scene
 from mlnlite.domains.handover.search import Configuration, Handover
 
 
@@ -26,7 +25,7 @@ class Advice:
         task: what the receiver will do with it.
         answer: what the model says.
         reasons: why, formula by formula.
-        scene: who and where, or None if no poses were asked for.
+        scene: who and where, the receiver's region being that of the answer; None if no poses were asked for.
         result: of the cost model for the method of the answer, or None.
     """
 
@@ -43,32 +42,30 @@ class Advice:
         return None if self.result is None else self.result.configuration
 
 
-def advise(knowledge: Knowledge, thing: HandoverObject, task: str, level: Level = "H", *, robot: str = "pr2") -> Advice:
+def advise(knowledge: Knowledge, scene: Scene, level: Level = "") -> Advice:
     """Where to hand an object over, how to hold it, and why.
 
     Args:
         knowledge: of `open_knowledge` or `read_learnt`.
-        thing: an object, known to the model or not.
-        task: what the receiver will do with it.
-        level: of mobility; where it is uncertain, poses are for the likeliest level.
-        robot: the giver; empty for no poses.
+        scene: of `make_scene`, with an object that the model knows or has never seen.
+        level: of mobility, if it is not the one of the scene's receiver: uncertain, or unknown.
 
     Raises:
-        MlnError: a task that the object does not afford, an unknown level or robot.
+        MlnError: an unknown level, probabilities that do not sum to 1.
+    """
+    said = advise_without_poses(knowledge, scene.thing, scene.task, level or scene.receiver.level.name)
+    asked = replace(scene, region=scene.thing.regions.index(said.answer.region))
+    return replace(said, scene=asked, result=hand_over(asked, said.answer.method))
+
+
+def advise_without_poses(knowledge: Knowledge, thing: HandoverObject, task: str, level: Level) -> Advice:
+    """The same from the knowledge base alone: which part, which method, and why.
+
+    Raises:
+        MlnError: a task that the object does not afford, an unknown level, probabilities that do not sum to 1.
     """
     answer = ask(knowledge, thing, task, level)
-    reasons = explain(knowledge, thing, task, level, answer)
-    if not robot:
-        return Advice(thing, task, answer, reasons, None, None)
-    scene = scene_of(answer, thing, task, robot)
-    return Advice(thing, task, answer, reasons, scene, hand_over(scene, answer.method, Options()))
-
-
-def scene_of(answer: Answer, thing: HandoverObject, task: str, robot: str) -> Scene:
-    """The scene of an answer: the receiver's region is what the model says, at the likeliest level."""
-    level = max(answer.levels, key=lambda name: answer.levels[name])
-    wanted = next((t for t, region in thing.affordances if region == answer.region), task)
-    return make_scene(thing, wanted, level, robot)
+    return Advice(thing, task, answer, explain(knowledge, thing, task, answer), None, None)
 
 
 def advice_text(advice: Advice, proof: ml.MapState | None = None) -> str:
@@ -84,7 +81,7 @@ def advice_text(advice: Advice, proof: ml.MapState | None = None) -> str:
         f" (method {answer.method}), {100 * answer.methods[answer.method]:.1f} % sure",
         f"  alternatives  {_listed(answer.regions)}; {_listed(answer.methods)}",
         *_poses(advice),
-        "  why",
+        "  why" if len(answer.levels) == 1 else f"  why, at level {likeliest(answer.levels)}",
     ]
     for predicate in ("graspRegion", "handover"):
         lines += [f"    - {reason}" for reason in said(advice.reasons, predicate, most=3)]

@@ -25,8 +25,8 @@ from mlnlite.domains.handover.objects import HandoverObject
 from mlnlite.domains.handover.study.preferences import level_shares, published
 from mlnlite.domains.handover.tables import choose
 
-Level = str | Mapping[str, float] | None
-"""A mobility level; or a probability for each of several; or None, unknown: then as common as in the study."""
+Level = str | Mapping[str, float]
+"""A mobility level; or a probability for each of several; or `unknown`: then as common as in the study."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,9 +116,7 @@ def certify(
         level: of mobility.
         method: of `mlnlite.map_state`: `auto`, `wcsp` and so on.
     """
-    levels = level_distribution(level)
-    likeliest = max(levels, key=lambda name: levels[name])
-    facts = kept(object_facts(thing, task) + level_facts(likeliest), knowledge.model.predicates)
+    facts = kept(object_facts(thing, task) + level_facts(likeliest(level)), knowledge.model.predicates)
     text = "".join(f"{fact_text(fact)}\n" for fact in facts)
     evidence = ml.evidence_from_text(text, model=knowledge.model)
     known = known_predicates(knowledge.model)
@@ -134,10 +132,9 @@ def read_learnt(path: str | Path) -> Knowledge:
     return open_knowledge(ml.read_model(path))
 
 
-def explain(knowledge: Knowledge, thing: HandoverObject, task: str, level: Level, answer: Answer) -> tuple[Reason, ...]:
+def explain(knowledge: Knowledge, thing: HandoverObject, task: str, answer: Answer) -> tuple[Reason, ...]:
     """Why not the second best: see `reasons_for`. Where the level is uncertain, for the likeliest one."""
-    likeliest = max(answer.levels, key=lambda name: answer.levels[name])
-    facts = kept(object_facts(thing, task) + level_facts(likeliest), knowledge.model.predicates)
+    facts = kept(object_facts(thing, task) + level_facts(likeliest(answer.levels)), knowledge.model.predicates)
     out: list[Reason] = []
     for predicate, ranked in (("graspRegion", answer.regions), ("handover", answer.methods)):
         names = list(ranked)[:2]
@@ -153,7 +150,7 @@ def level_distribution(level: Level) -> dict[str, float]:
     Raises:
         MlnError: unknown level, or probabilities that do not sum to 1.
     """
-    if level is None:
+    if level == "unknown":
         return dict(zip(published().levels, level_shares(published()).tolist(), strict=True))
     given = {level: 1.0} if isinstance(level, str) else dict(level)
     for name, p in given.items():
@@ -163,6 +160,12 @@ def level_distribution(level: Level) -> dict[str, float]:
     if not isclose(sum(given.values()), 1.0, abs_tol=1e-6):
         raise ml.MlnError(f"the levels' probabilities sum to {sum(given.values()):g}", hint="let them sum to 1")
     return given
+
+
+def likeliest(level: Level) -> str:
+    """The most probable level."""
+    levels = level_distribution(level)
+    return max(levels, key=lambda name: levels[name])
 
 
 def _methods(model: ml.Model) -> list[tuple[str, str]]:

@@ -59,6 +59,11 @@ def databases_text(instances: Sequence[Sequence[Fact]]) -> str:
     return "---\n".join("".join(f"{fact_text(fact)}\n" for fact in facts) for facts in instances)
 
 
+def about_receiver(facts: Iterable[Fact]) -> tuple[Fact, ...]:
+    """The facts that are not about the object."""
+    return tuple(fact for fact in facts if THING not in fact[1:2])
+
+
 def gathered_text(instances: Sequence[Sequence[Fact]]) -> str:
     """The same instances in few databases, those of equal level together, each about an object of its own.
 
@@ -66,7 +71,7 @@ def gathered_text(instances: Sequence[Sequence[Fact]]) -> str:
     """
     groups: dict[tuple[Fact, ...], list[str]] = {}
     for i, facts in enumerate(instances):
-        shared = tuple(fact for fact in facts if THING not in fact[1:2])
+        shared = about_receiver(facts)
         lines = groups.setdefault(shared, [f"{fact_text(fact)}\n" for fact in shared])
         lines += [f"{fact_text((fact[0], f'{THING}{i}', *fact[2:]))}\n" for fact in facts if fact not in shared]
     return "---\n".join("".join(lines) for lines in groups.values())

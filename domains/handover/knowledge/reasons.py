@@ -88,4 +88,4 @@ def _strength(reason: Reason) -> str:
     other = reason.winner if reason.log_odds > 0 else reason.runner_up
     if factor < 1.1:
         return f"makes hardly a difference between {other} and {name}"
-    return f"makes {other} {factor:.1f} times as likely, compared with {name}"
+    return f"makes {other} {factor:.{int(factor < 10)}f} times as likely, compared with {name}"

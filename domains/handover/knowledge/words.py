@@ -13,15 +13,13 @@ from importlib.resources.abc import Traversable
 from typing import Any
 
 import mlnlite as ml
-from mlnlite.domains.handover.mobility import read_levels
 from mlnlite.domains.handover.objects import AFFORDANCES, CATEGORIES, MATERIALS, SHAPES, TEXTURES, HandoverObject
 from mlnlite.domains.handover.tables import choose, read_table
 
 FOLDER: Traversable = files("mlnlite.domains.handover.knowledge")
 VARIANTS = ("handover", "backoff", "pairs", "paper", "affordance")
-"""Models of this folder: the domain's own; the published words with lower-order templates, and with
-all pairs; the authors' single
-conjunction; the templates of 2019."""
+"""Models of this folder: the domain's own; the published words with lower-order templates, and with all pairs; the
+authors' single conjunction; the templates of 2019."""
 LEVELS = {"H": "level_1", "H-M": "level_2", "L-M": "level_3", "L": "level_4"}
 METHODS = {"A": "far", "B": "midway", "ours": "ours"}
 ASKED = ("graspRegion", "handover")
@@ -109,7 +107,7 @@ def level_constant(level: str) -> str:
     Raises:
         MlnError: unknown level.
     """
-    return LEVELS[choose(level, [name.name for name in read_levels() if name.name in LEVELS], "mobility level")]
+    return LEVELS[choose(level, LEVELS, "mobility level")]
 
 
 def level_name(constant: str) -> str:
