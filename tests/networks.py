@@ -20,7 +20,7 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
     blocks: for each variable ("", 1), ("!", number of atoms) or ("?", number of atoms).
     clauses: (list of (literals, weight index, count), negated), literals of equal length.
     tables: (truth, list of (atoms, weight index, count)).
-    counts: (true groundings for each count, list of (literals, weight index, count)).
+    counts: (true groundings at each state, list of (literals, weight index, count), steps).
     """
     variable, value, cardinality, is_block = [], [], [], []
     for v, (marker, n) in enumerate(blocks):
@@ -38,8 +38,8 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
         for truth, rows in tables
     ]
     count_blocks = [
-        Counts(np.array([sorted(r[0], key=abs) for r in rows], np.int32), np.array(true, np.int64), *_columns(rows))
-        for true, rows in counts
+        Counts(np.array([r[0] for r in rows], np.int32), np.array(true, np.int64), *_columns(rows), np.int32(steps))
+        for true, rows, steps in counts
     ]
     decided = np.zeros(n_weights, np.int64) if decided_true is None else np.array(decided_true, np.int64)
     total = decided + (0 if undecided_false is None else np.array(undecided_false, np.int64))
@@ -83,7 +83,8 @@ def world_counts(net, truth):
             counts[w] += n * bool(t.truth[tuple(int(truth[a]) for a in atoms)])
     for c in net.counts:
         for literals, w, n in zip(c.literals.tolist(), c.weight, c.count, strict=True):
-            counts[w] += n * c.true[sum(bool(truth[abs(x) - 1]) == (x > 0) for x in literals)]
+            holds = [bool(truth[abs(x) - 1]) == (x > 0) for x in literals]
+            counts[w] += n * c.true[sum(step for step, is_true in zip(c.steps, holds, strict=True) if is_true)]
     return counts
 
 
@@ -123,8 +124,10 @@ def networks(draw, max_atoms=10, hard=True, with_counts=True):
     counts = []
     for _ in range(rng.integers(0, 3) if with_counts else 0):
         k = min(int(rng.integers(1, 7)), n)
-        true = rng.choice([rng.integers(0, 2, k + 1), rng.integers(0, 4, k + 1), np.arange(k + 1)]) + (0 if k else 1)
-        counts.append((true, [_row(rng, n, k, weights, signed=True) for _ in range(rng.integers(1, 3))]))
+        steps = rng.choice([np.ones(k, int), np.sort(rng.integers(1, 4, k))])
+        n_states = steps.sum() + 1
+        true = rng.choice([rng.integers(0, 2, n_states), rng.integers(0, 4, n_states), np.arange(n_states)])
+        counts.append((true, [_row(rng, n, k, weights, signed=True) for _ in range(rng.integers(1, 3))], steps))
     decided = rng.integers(0, 3, len(weights))
     return network(blocks, clauses, tables, weights, decided, counts=counts)
 

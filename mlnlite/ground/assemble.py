@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from mlnlite.ground.compile import strides
 from mlnlite.ground.merge import merged, merged_clauses
-from mlnlite.ground.network import Clauses, Network, Tables
-from mlnlite.ground.residual import ClauseShape, TableShape
+from mlnlite.ground.network import Clauses, Counts, Network, Tables
+from mlnlite.ground.residual import ClauseShape, CountShape, TableShape
+from mlnlite.ground.states import counts_of
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Predicate
@@ -28,13 +29,13 @@ class Piece:
 
     Attributes:
         atoms: for each of `shape.atoms` a column of atom numbers, shape (n,).
-        shape: clause or table.
+        shape: clause, table, or function of counts.
         row: shape (n,), row of the template.
         count: shape (n,), how many groundings.
     """
 
     atoms: tuple[Int64, ...]
-    shape: ClauseShape | TableShape
+    shape: ClauseShape | TableShape | CountShape
     row: Int64
     count: Int64
 
@@ -86,6 +87,7 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         template=np.repeat(np.arange(len(parts), dtype=np.int32), sizes),
         decided_true=np.concatenate([np.empty(0, np.int64), *(part.decided_true for part in parts)]),
         n_groundings=np.concatenate([np.empty(0, np.int64), *(part.n_groundings for part in parts)]),
+        counts=_counts(parts, first, index),
     )
     _lock(network)
     return network
@@ -238,6 +240,20 @@ def _tables(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Tables, 
         *atoms, weight, count = _joined(items)
         rows, weight, count = merged(atoms, weight, count)
         blocks.append(Tables(rows, np.frombuffer(truth, np.bool_).reshape((2,) * n_atoms), weight, count))
+    return tuple(blocks)
+
+
+def _counts(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Counts, ...]:
+    gathered: dict[CountShape, list[Columns]] = {}
+    for part, offset in zip(parts, first, strict=False):
+        for piece in part.pieces:
+            if isinstance(piece.shape, CountShape):
+                columns = (*map(index, piece.atoms), (piece.row + offset).astype(np.int32), piece.count)
+                gathered.setdefault(piece.shape, []).append(columns)
+    blocks = []
+    for shape, items in gathered.items():
+        *atoms, weight, count = _joined(items)
+        blocks.append(counts_of(shape, *merged(atoms, weight, count)))
     return tuple(blocks)
 
 

@@ -16,7 +16,7 @@ from mlnlite.engines.plan import AntiJoin, Compute, Count, Join, Lookup, One, Pl
 from mlnlite.ground.tables import KNOWN_FALSE
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import Argument, AtomRef, AtomSchema, Const, Equal, Formula, Var
-from mlnlite.model.propositional import Cube
+from mlnlite.model.propositional import Counted, Cube
 
 WORLDS = "worlds"
 """Table of the numbers of the databases."""
@@ -33,6 +33,7 @@ class Source:
         rows: name of the table of the template's rows (keys, then row number).
         n_rows: its length.
         world: the column of the database, or None where there is one database only.
+        counted: the counted propositions of the formula.
     """
 
     formula: Formula
@@ -41,6 +42,7 @@ class Source:
     rows: str
     n_rows: int
     world: str | None = None
+    counted: tuple[Counted, ...] = ()
 
     @property
     def tabled(self) -> bool:
@@ -260,8 +262,8 @@ def strides(evidence: Evidence, predicate: str) -> list[int]:
     return [prod(sizes[i + 1 :]) for i in range(len(sizes))]
 
 
-def with_number(plan: Plan, evidence: Evidence, schema: AtomSchema, name: str) -> Plan:
-    """Adds the number of an atom as column `name`."""
+def affine(evidence: Evidence, schema: AtomSchema) -> tuple[dict[str, int], int]:
+    """The number of an atom as a sum: the factors of columns of variables, and a constant."""
     terms: dict[str, int] = {}
     constant = evidence.first_atom()[schema.predicate]
     for argument, stride in zip(schema.arguments, strides(evidence, schema.predicate), strict=True):
@@ -269,6 +271,12 @@ def with_number(plan: Plan, evidence: Evidence, schema: AtomSchema, name: str) -
             constant += argument.id * stride
         else:
             terms[column(argument.index)] = terms.get(column(argument.index), 0) + stride
+    return terms, constant
+
+
+def with_number(plan: Plan, evidence: Evidence, schema: AtomSchema, name: str) -> Plan:
+    """Adds the number of an atom as column `name`."""
+    terms, constant = affine(evidence, schema)
     return Compute(plan, name, tuple(terms.items()), constant)
 
 

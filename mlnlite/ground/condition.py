@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Contradiction, Diagnostic
 from mlnlite.ground.merge import merged_clauses
-from mlnlite.ground.network import Clauses, Network, Tables
-from mlnlite.ground.residual import ClauseShape, Decided, table_shape
+from mlnlite.ground.network import Clauses, Counts, Network, Tables
+from mlnlite.ground.residual import ClauseShape, CountShape, Decided, TableShape, table_shape
+from mlnlite.ground.states import NONE, counts_of, reduced
 from mlnlite.model.evidence import Evidence, Facts
 
 Int8 = NDArray[np.int8]
@@ -39,13 +41,13 @@ def condition(network: Network, known: Int8) -> Network:
     decided = network.decided_true.copy()
     place = np.cumsum(known == UNKNOWN, dtype=np.int32) - 1
     state = _State(known, place, decided)
-    clauses: list[Clauses] = []
+    factors: list[Factor] = []
     for block in network.clauses:
-        clauses += _clauses(block, state)
-    tables: list[Tables] = []
+        factors += _clauses(block, state)
     for table_block in network.tables:
-        new_clauses, new_tables = _tables(table_block, state)
-        clauses, tables = clauses + new_clauses, tables + new_tables
+        factors += _tables(table_block, state)
+    for count_block in network.counts:
+        factors += _counts(count_block, state)
     left = known == UNKNOWN
     variable, value, cardinality, is_block = _variables(network, left, known)
     return replace(
@@ -56,8 +58,9 @@ def condition(network: Network, known: Int8) -> Network:
         value=value,
         cardinality=cardinality,
         block=is_block,
-        clauses=_gathered(clauses),
-        tables=tuple(tables),
+        clauses=_gathered([f for f in factors if isinstance(f, Clauses)]),
+        tables=tuple(f for f in factors if isinstance(f, Tables)),
+        counts=tuple(f for f in factors if isinstance(f, Counts)),
         decided_true=decided,
     )
 
@@ -144,8 +147,10 @@ def _with_facts(network: Network, known: Int8) -> Evidence:
 
 # --- factors
 
+Factor: TypeAlias = Clauses | Tables | Counts
 
-def _clauses(block: Clauses, state: _State) -> list[Clauses]:
+
+def _clauses(block: Clauses, state: _State) -> list[Factor]:
     atom = np.abs(block.literals) - 1
     value = state.known[atom]
     is_open = value == UNKNOWN
@@ -153,7 +158,7 @@ def _clauses(block: Clauses, state: _State) -> list[Clauses]:
     n_open = is_open.sum(axis=1)
     now_true = satisfied != block.negated if not block.negated else ~satisfied & (n_open == 0)
     state.decide(block.weight[now_true], block.count[now_true])
-    found = []
+    found: list[Factor] = []
     for n in np.unique(n_open[~satisfied & (n_open > 0)]).tolist():
         rows = np.flatnonzero(~satisfied & (n_open == n))
         columns = np.argsort(~is_open[rows], axis=1, kind="stable")[:, :n]
@@ -163,29 +168,52 @@ def _clauses(block: Clauses, state: _State) -> list[Clauses]:
     return found
 
 
-def _tables(block: Tables, state: _State) -> tuple[list[Clauses], list[Tables]]:
+def _tables(block: Tables, state: _State) -> list[Factor]:
     value = state.known[block.atoms]
     code = (value.astype(np.int64) + 1) @ (3 ** np.arange(value.shape[1], dtype=np.int64))
-    clauses: list[Clauses] = []
-    tables: list[Tables] = []
+    found: list[Factor] = []
     for pattern in np.unique(code).tolist():
         rows = np.flatnonzero(code == pattern)
         index = tuple(slice(None) if v == UNKNOWN else int(v) for v in value[rows[0]].tolist())
         open_columns = tuple(np.flatnonzero(value[rows[0]] == UNKNOWN).tolist())
         shape = table_shape(open_columns, np.asarray(block.truth[index]))
         weight, count = block.weight[rows], block.count[rows]
-        if isinstance(shape, Decided):
-            if shape.truth:
-                state.decide(weight, count)
-            continue
-        atoms = state.place[block.atoms[rows][:, list(shape.atoms)]]
-        if isinstance(shape, ClauseShape):
-            literals = ((atoms + 1) * np.where(shape.signs, 1, -1)).astype(np.int32)
-            order = np.argsort(np.abs(literals), axis=1)
-            clauses.append(Clauses(np.take_along_axis(literals, order, 1), weight, count, shape.negated))
-        else:
-            tables.append(Tables(atoms.astype(np.int32), shape.truth, weight, count))
-    return clauses, tables
+        if not isinstance(shape, Decided):
+            found.append(_factor(shape, state.place[block.atoms[rows][:, list(shape.atoms)]], weight, count))
+        elif shape.truth:
+            state.decide(weight, count)
+    return found
+
+
+def _counts(block: Counts, state: _State) -> list[Factor]:
+    atom, positive = np.abs(block.literals) - 1, block.literals > 0
+    value = state.known[atom]
+    is_open = value == UNKNOWN
+    holds_if_false = np.where(is_open, ~positive, (value == 1) == positive)
+    offset = holds_if_false @ block.steps.astype(np.int64)
+    steps = np.where(positive, block.steps, -block.steps).astype(np.int64)
+    atoms = np.where(is_open, state.place[atom], NONE).astype(np.int64)
+    found: list[Factor] = []
+    for part in reduced(atoms, steps, offset, block.true):
+        weight, count = block.weight[part.index], block.count[part.index]
+        state.decide(weight, count * part.certain)
+        if not isinstance(part.shape, Decided):
+            found.append(_factor(part.shape, np.stack(part.atoms, axis=1), weight, count))
+    return found
+
+
+def _factor(shape: ClauseShape | TableShape | CountShape, atoms: Int32 | Int64, weight: Int32, count: Int64) -> Factor:
+    """Factors of one shape over the columns of `atoms`, in the order of the shape's atoms."""
+    rows = atoms.astype(np.int32)
+    if isinstance(shape, ClauseShape):
+        literals = ((rows + 1) * np.where(shape.signs, 1, -1)).astype(np.int32)
+        order = np.argsort(np.abs(literals), axis=1)
+        return Clauses(np.take_along_axis(literals, order, 1), weight, count, shape.negated)
+    return (
+        Tables(rows, shape.truth, weight, count)
+        if isinstance(shape, TableShape)
+        else counts_of(shape, rows, weight, count)
+    )
 
 
 def _gathered(blocks: Sequence[Clauses]) -> tuple[Clauses, ...]:

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.numpy import NumpyEngine
-from mlnlite.engines.plan import Count, Engine
-from mlnlite.ground.compile import bindings
-from mlnlite.ground.ground import groundings_of_a_row, row_tables, source_of
+from mlnlite.engines.plan import Count, Engine, Run
+from mlnlite.ground.compile import Source, bindings
+from mlnlite.ground.ground import counting_source, groundings_of_a_row, part_of, plan_of, row_tables, source_of
 from mlnlite.ground.tables import tables_of
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
@@ -30,6 +30,10 @@ def count_true(model: Model, world: Evidence, *, engine: Engine | None = None) -
     run = (engine or NumpyEngine()).load({**tables_of(world), **row_tables(model)})
     found = [np.empty(0, np.int64)]
     for i, template in enumerate(model.templates):
+        counting = counting_source(i, template, world)
+        if counting is not None:
+            found.append(_by_listing(counting, run))
+            continue
         source = source_of(i, template, world)
         false, true = cubes(source.formula.body, False), cubes(source.formula.body, True)
         chosen = true if len(true) < len(false) else false
@@ -39,3 +43,13 @@ def count_true(model: Model, world: Evidence, *, engine: Engine | None = None) -
             np.add.at(n, rows["row"] if source.tabled else np.zeros(len(rows["count"]), np.int64), rows["count"])
         found.append(n if chosen is true else groundings_of_a_row(source) - n)
     return np.concatenate(found)
+
+
+def _by_listing(source: Source, run: Run) -> Int64:
+    """True groundings of a formula with counts: these are listed, and found to be decided."""
+    plan = plan_of(source)
+    if isinstance(plan, bool):
+        return np.full(source.n_rows, plan * groundings_of_a_row(source), np.int64)
+    part = part_of(source, plan, run)
+    assert part is not None
+    return part.decided_true

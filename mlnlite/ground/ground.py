@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import prod
 
@@ -14,16 +15,18 @@ from mlnlite.engines.plan import Column, Engine, Relation, Run, Tables
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
 from mlnlite.ground.assemble import Part, Piece, network_of
 from mlnlite.ground.compile import Compiled, Source, atom_column, bindings, column, compiled, with_atom
+from mlnlite.ground.counting import counting_groups, counting_plan, plain_cubes
 from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, verify
 from mlnlite.ground.groups import Group, groups_of
 from mlnlite.ground.network import Network
-from mlnlite.ground.residual import Decided
+from mlnlite.ground.residual import Decided, equalities_in
+from mlnlite.ground.states import NARROW
 from mlnlite.ground.tables import completed, tables_of
 from mlnlite.model.evidence import Evidence
-from mlnlite.model.formulas import All, Any, AtomRef, Equal, Expression, Iff, Not
+from mlnlite.model.formulas import AtomRef, AtomSchema
 from mlnlite.model.model import Model
 from mlnlite.model.numbers import comparison_truth
-from mlnlite.model.propositional import Cube, cubes, without_quantifiers
+from mlnlite.model.propositional import Cube, cubes, with_counted, without_quantifiers
 from mlnlite.model.soft import soft_templates
 from mlnlite.model.templates import Template
 
@@ -58,15 +61,38 @@ def ground(
     run = (engine or engine_for(tables, memory=limits.memory)).load(tables)
     parts = []
     for i, template in enumerate(model.templates):
-        source = source_of(i, template, evidence)
-        plan = plan_of(source)
-        if isinstance(plan, bool):
-            parts.append(_constant(source, template, truth=plan))
-            continue
-        if limits != NO_LIMITS:
-            verify(forecast(template, plan.compiled, tables), source, limits)
-        parts.append(_grounded(source, template, plan, run))
+        with _blamed(template):
+            counting = counting_source(i, template, evidence)
+            source = counting or source_of(i, template, evidence)
+            part = _ground_template(source, template, run, tables, limits)
+            if part is None:
+                part = _ground_template(source_of(i, template, evidence), template, run, tables, limits)
+        assert part is not None
+        parts.append(part)
     return network_of(model, evidence, parts, query)
+
+
+def _ground_template(source: Source, template: Template, run: Run, tables: Tables, limits: Limits) -> Part | None:
+    """What a template gives; None if what it counts cannot be told from counts."""
+    plan = plan_of(source)
+    if isinstance(plan, bool):
+        return _constant(source, template, truth=plan)
+    if limits != NO_LIMITS:
+        verify(forecast(template, plan.compiled, tables), source, limits)
+    return _grounded(source, template, plan, run)
+
+
+@contextmanager
+def _blamed(template: Template) -> Iterator[None]:
+    """Says of limits that are reached within which template that was."""
+    try:
+        yield
+    except LimitReached as error:
+        cause = error.diagnostics[0]
+        if cause.span is not None:
+            raise
+        message = f"{template.name} cannot be grounded: {cause.message}"
+        raise LimitReached([Diagnostic("E402", message, template.span, cause.hint)]) from error
 
 
 def forecasts(model: Model, evidence: Evidence) -> list[Forecast]:
@@ -74,7 +100,7 @@ def forecasts(model: Model, evidence: Evidence) -> list[Forecast]:
     model, evidence, tables = prepared(model, evidence)
     found = []
     for i, template in enumerate(model.templates):
-        plan = plan_of(source_of(i, template, evidence))
+        plan = plan_of(counting_source(i, template, evidence) or source_of(i, template, evidence))
         found.append(
             Forecast(template, 0.0, 0.0, 0.0, 0.0)
             if isinstance(plan, bool)
@@ -131,12 +157,28 @@ def row_tables(model: Model) -> dict[str, tuple[Column, ...]]:
 
 def source_of(index: int, template: Template, evidence: Evidence, world: str | None = None) -> Source:
     """What plans of an (expanded) template draw on: its formula without quantifiers, and what is known."""
-    constants = {name: np.flatnonzero(p.any(axis=0)).tolist() for name, p in evidence.present.items()}
-    formula = without_quantifiers(
-        template.formula, constants, lambda schema: comparison_truth(schema, evidence.predicates, evidence.types)
-    )
     assert template.rows is not None
+    formula = without_quantifiers(template.formula, _constants(evidence), _comparisons(evidence))
     return Source(formula, evidence, template.keys, f"rows:{index}", len(template.rows), world)
+
+
+def counting_source(index: int, template: Template, evidence: Evidence) -> Source | None:
+    """As `source_of`, with quantifiers counted; None if there are none, or over few atoms only."""
+    assert template.rows is not None
+    if not any(v.bound for v in template.formula.variables):
+        return None
+    formula, counted = with_counted(template.formula, _constants(evidence), _comparisons(evidence))
+    if not counted or len(formula.atoms) <= NARROW:
+        return None
+    return Source(formula, evidence, template.keys, f"rows:{index}", len(template.rows), None, counted)
+
+
+def _constants(evidence: Evidence) -> dict[str, list[int]]:
+    return {name: np.flatnonzero(p.any(axis=0)).tolist() for name, p in evidence.present.items()}
+
+
+def _comparisons(evidence: Evidence) -> Callable[[AtomSchema], bool | None]:
+    return lambda schema: comparison_truth(schema, evidence.predicates, evidence.types)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,24 +202,44 @@ def plan_of(source: Source) -> TemplatePlan | bool:
     false, true = cubes(body, False), cubes(body, True)
     if not (false and true):
         return bool(true)
+    if source.counted:
+        chosen, other = plain_cubes(true), plain_cubes(false)
+        lists_true = {} not in chosen and (len(chosen) < len(other) or {} in other)
+        return TemplatePlan(counting_plan(source, chosen if lists_true else other), lists_true, false)
     lists_true = len(true) < len(false)
-    equalities = tuple(dict.fromkeys(_equalities(body)))
+    equalities = tuple(dict.fromkeys(equalities_in(body)))
     return TemplatePlan(compiled(source, true if lists_true else false, equalities), lists_true, false)
 
 
-def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Run) -> Part:
+def part_of(source: Source, planned: TemplatePlan, run: Run) -> Part | None:
+    """What a template gives; None if what it counts cannot be told from counts. Raises `LimitReached`, unnamed."""
     plan = planned.compiled
+    rows = run(plan.plan)
+    groups = counting_groups(source, rows) if source.counted else groups_of(source.formula, plan, rows)
+    return None if groups is None else _part(source, plan, rows, groups, lists_true=planned.lists_true)
+
+
+def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Run) -> Part | None:
     try:
-        rows = run(plan.plan)
-        groups = groups_of(source.formula, plan, rows)
+        part = part_of(source, planned, run)
     except LimitReached as error:
         cause = error.diagnostics[0]
         message = f"{template.name} cannot be grounded: {cause.message}"
         raise LimitReached([Diagnostic("E402", message, template.span, cause.hint or advice(source))]) from error
-    part = _part(source, plan, rows, groups, lists_true=planned.lists_true)
-    if template.hard and (part.decided_false > 0).any():
-        raise _violated(template, violation(source, planned.false, run))
+    if part is not None and template.hard and (part.decided_false > 0).any():
+        raise _violated(template, violation(source, planned, run))
     return part
+
+
+def _listed(source: Source, planned: TemplatePlan, run: Run) -> str:
+    """The binding of a row that evidence makes false, as text, if one is listed."""
+    rows = run(planned.compiled.plan)
+    for group in counting_groups(source, rows) or []:
+        if group.shape == Decided(truth=False):
+            row = group.index.start or 0 if isinstance(group.index, slice) else group.index[0]
+            bound = [v for v in source.formula.free if column(v) in rows]
+            return _binding_text(source, {v: int(rows[column(v)][row]) for v in bound})
+    return ""
 
 
 def _violated(template: Template, where: str) -> Contradiction:
@@ -186,9 +248,11 @@ def _violated(template: Template, where: str) -> Contradiction:
     return Contradiction([Diagnostic("E403", message, template.span, hint)])
 
 
-def violation(source: Source, false: Sequence[Cube], run: Run) -> str:
-    """A binding for which evidence makes a formula false, as text: ` (x = Anna)`."""
-    for cube in false:
+def violation(source: Source, planned: TemplatePlan, run: Run) -> str:
+    """A binding for which evidence makes a formula false, as text: ` (x = Anna)`; empty if none is listed."""
+    if source.counted:
+        return _listed(source, planned, run)
+    for cube in planned.false:
         atoms = [p.index for p in cube if isinstance(p, AtomRef)]
         plan = bindings(source, cube, source.formula.free)
         for index in atoms:
@@ -218,20 +282,6 @@ def _constant(source: Source, template: Template, *, truth: bool) -> Part:
     return Part((), every, none) if truth else Part((), none, every)
 
 
-def _equalities(expression: Expression) -> Iterator[Equal]:
-    match expression:
-        case Equal():
-            yield expression
-        case Not(operand):
-            yield from _equalities(operand)
-        case All(operands) | Any(operands):
-            for operand in operands:
-                yield from _equalities(operand)
-        case Iff(left, right):
-            yield from _equalities(left)
-            yield from _equalities(right)
-
-
 def _part(source: Source, plan: Compiled, rows: Relation, groups: list[Group], *, lists_true: bool) -> Part:
     """The pieces of a template, and how many groundings of each of its rows evidence decides."""
     n_rows = len(next(iter(rows.values()))) if rows else 1
@@ -247,8 +297,7 @@ def _part(source: Source, plan: Compiled, rows: Relation, groups: list[Group], *
             listed[group.shape.truth] += sums
             continue
         open_ += sums
-        atoms = tuple(rows[atom_column(i)][group.index] for i in group.shape.atoms)
-        pieces.append(Piece(atoms, group.shape, row[group.index], count[group.index]))
+        pieces.append(Piece(group.atoms, group.shape, row[group.index], count[group.index]))
     if lists_true:
         decided_true, decided_false = listed[True], total - open_ - listed[True]
     else:

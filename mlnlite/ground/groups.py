@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mlnlite.engines.plan import Relation
 from mlnlite.ground.compile import Compiled, atom_column, equality_column
-from mlnlite.ground.residual import Shape, shape_of
+from mlnlite.ground.residual import CountShape, Decided, Shape, shape_of
 from mlnlite.ground.tables import KNOWN_TRUE
 from mlnlite.model.formulas import All, Any, AtomRef, Expression, Formula, Iff, Not
 from mlnlite.model.propositional import Proposition, simplified
@@ -21,10 +21,11 @@ Int64 = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Rows (their indices; all of them, if a slice) that leave the same shape."""
+    """Rows (their indices; all of them, if a slice) that leave the same shape of atoms (a column for each)."""
 
     index: Int64 | slice
-    shape: Shape
+    shape: Shape | CountShape
+    atoms: tuple[Int64, ...]
 
 
 def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
@@ -49,7 +50,9 @@ def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
         first = 0 if isinstance(index, slice) else index[0]
         known, merged = _meaning({key: int(column[first]) for key, column in features.items()})
         body = simplified(renamed(formula.body, merged), {**plan.known, **known})
-        groups.append(Group(index, shape_of(body)))
+        shape = shape_of(body)
+        atoms = () if isinstance(shape, Decided) else tuple(rows[atom_column(i)][index] for i in shape.atoms)
+        groups.append(Group(index, shape, atoms))
     return groups
 
 

@@ -42,7 +42,12 @@ def without_templates(network: Network, templates: Iterable[int]) -> Network:
         for t in network.tables
         for k in [~left_out[t.weight]]
     )
-    return replace(network, clauses=clauses, tables=tables)
+    counts = tuple(
+        replace(t, literals=t.literals[k], weight=t.weight[k], count=t.count[k])
+        for t in network.counts
+        for k in [~left_out[t.weight]]
+    )
+    return replace(network, clauses=clauses, tables=tables, counts=counts)
 
 
 def world_evidence(network: Network, truth: NDArray[np.bool_]) -> Evidence:

@@ -57,22 +57,31 @@ class Tables:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Ground formulas whose number of true groundings depends on a count only.
+    """Ground formulas whose number of true groundings depends on counts only.
 
-    "At most one advisor" over all pairs of 50 candidates is 1,225 clauses, or one function of how many are advisors.
+    The state of a factor is the sum of the steps of its true literals. Where all steps are 1 it is their number: "at
+    most one advisor" over all pairs of 50 candidates is 1,225 clauses, or one function of how many are advisors. In
+    `Popular(x) <=> count(Friend(x, y) | y) >= 2` the friends have step 1 and the other atom a step larger than
+    their number, so that both can be read off the state.
 
     Attributes:
-        literals: shape (n, m), each row sorted by atom, no atom twice.
-        true: shape (m + 1,), number of true groundings where j of the literals are true; its largest entry is the
-            number of groundings.
+        literals: shape (n, m), each row sorted by atom where steps are equal, no atom twice.
+        true: shape (sum(steps) + 1,), number of true groundings at each state; the largest is the number of groundings.
         weight: shape (n,), index of each one's weight.
         count: shape (n,), how often each grounding is there.
+        steps: shape (m,), positive, what each literal adds to the state.
     """
 
     literals: Int32
     true: Int64
     weight: Int32
     count: Int64
+    steps: Int32
+
+    @property
+    def plain(self) -> bool:
+        """Whether the state is the number of true literals."""
+        return bool((self.steps == 1).all())
 
 
 @dataclass(frozen=True, slots=True)

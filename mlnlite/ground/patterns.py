@@ -1,18 +1,22 @@
-"""Complete patterns to counting factors: all pairs of a group become one function of a count. Network in, network out.
+"""Complete patterns to counting factors, and counting factors to tables. Network in, network out, one distribution.
 
-The distribution stays the same. A group of k atoms loses its k (k - 1) / 2 clauses of two literals.
+A group of k atoms of which all pairs stand in a clause loses its k (k - 1) / 2 clauses of two literals.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mlnlite.ground.network import Clauses, Counts, Network
+from mlnlite.errors import Diagnostic, LimitReached
+from mlnlite.ground.network import Clauses, Counts, Network, Tables
+from mlnlite.ground.residual import WIDEST_TABLE
 
+Bool = NDArray[np.bool_]
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 
@@ -61,7 +65,7 @@ def _split(block: Clauses) -> tuple[Clauses, list[Counts]]:
         rows = literal[members][order].reshape(len(chosen), m)
         edge = first[chosen]
         true = _pairs(m, negated=block.negated)
-        found.append(Counts(rows, true, block.weight[edge], block.count[edge]))
+        found.append(Counts(rows, true, block.weight[edge], block.count[edge], np.ones(m, np.int32)))
     return rest, found
 
 
@@ -89,3 +93,31 @@ def _pairs(m: int, *, negated: bool) -> Int64:
     j = np.arange(m + 1, dtype=np.int64)
     both_false = (m - j) * (m - j - 1) // 2
     return both_false if negated else m * (m - 1) // 2 - both_false
+
+
+def without_counts(network: Network) -> Network:
+    """The network with truth tables in place of counting factors, for what does not take these.
+
+    Raises:
+        LimitReached: if such a factor has more than `WIDEST_TABLE` atoms.
+    """
+    tables = list(network.tables)
+    for block in network.counts:
+        m = block.literals.shape[1]
+        if m > WIDEST_TABLE:
+            template = network.model.templates[network.template[block.weight[0]]]
+            message = f"{template.name} counts over {m} unknown atoms, and here at most {WIDEST_TABLE} are possible"
+            hint = "give more evidence, or choose a method that takes counts"
+            raise LimitReached([Diagnostic("E413", message, template.span, hint)])
+        for signs in np.unique(block.literals > 0, axis=0):
+            tables += _as_tables(block, signs, ((block.literals > 0) == signs).all(axis=1))
+    return replace(network, tables=tuple(tables), counts=())
+
+
+def _as_tables(block: Counts, signs: Bool, chosen: Bool) -> Iterator[Tables]:
+    """Factors with the same signs as tables: one for each number of true groundings, counted so often more."""
+    digits = np.indices((2,) * len(signs))
+    state = np.tensordot(block.steps, np.where(signs.reshape(-1, *([1] * len(signs))), digits, 1 - digits), 1)
+    true = block.true[state]
+    for least in range(1, int(block.true.max(initial=0)) + 1):
+        yield Tables(np.abs(block.literals[chosen]) - 1, true >= least, block.weight[chosen], block.count[chosen])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias, assert_never
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from mlnlite.errors import LimitReached
 from mlnlite.model.formulas import All, Any, AtomRef, Count, Equal, Exists, Expression, Iff, Not
-from mlnlite.model.propositional import FALSE, TRUE
+from mlnlite.model.propositional import FALSE, TRUE, Proposition
 
 WIDEST_TABLE = 14
 """Atoms of a formula that is neither clause nor conjunction; its truth table has 2 to the power of this many cells."""
@@ -40,6 +41,14 @@ class TableShape:
     truth: NDArray[np.bool_]
 
 
+@dataclass(frozen=True, slots=True)
+class CountShape:
+    """A function of a state, the sum of the steps of the true atoms: how many groundings are true at each state."""
+
+    steps: tuple[int, ...]
+    true: tuple[int, ...]
+
+
 Shape: TypeAlias = Decided | ClauseShape | TableShape
 
 
@@ -61,7 +70,7 @@ def shape_of(expression: Expression) -> Shape:
             f"at most {WIDEST_TABLE} are possible",
             hint="give evidence, declare predicates of the quantified part closed, or split the formula into clauses",
         )
-    return table_shape(atoms, truth_table(expression, atoms))
+    return table_shape(atoms, truth_table(expression, tuple(map(AtomRef, atoms))))
 
 
 def _flat(expression: Expression) -> ClauseShape | None:
@@ -97,20 +106,35 @@ def atoms_in(expression: Expression) -> set[int]:
             assert_never(expression)
 
 
-def truth_table(expression: Expression, atoms: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Truth of an expression for all truth values of its atoms, shape (2,) * len(atoms)."""
-    axes = {}
-    for i, atom in enumerate(atoms):
-        shape = [1] * len(atoms)
-        shape[i] = 2
-        axes[atom] = np.array([False, True]).reshape(shape)
-    return np.broadcast_to(_values(expression, axes), (2,) * len(atoms)).copy()
-
-
-def _values(expression: Expression, axes: dict[int, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+def equalities_in(expression: Expression) -> Iterator[Equal]:
+    """The equalities of an expression without quantifiers, as often as they stand there."""
     match expression:
-        case AtomRef(index):
-            return axes[index]
+        case Equal():
+            yield expression
+        case Not(operand):
+            yield from equalities_in(operand)
+        case All(operands) | Any(operands):
+            for operand in operands:
+                yield from equalities_in(operand)
+        case Iff(left, right):
+            yield from equalities_in(left)
+            yield from equalities_in(right)
+
+
+def truth_table(expression: Expression, propositions: tuple[Proposition, ...]) -> NDArray[np.bool_]:
+    """Truth of an expression for all truth values of its propositions, shape (2,) * len(propositions)."""
+    axes = {}
+    for i, proposition in enumerate(propositions):
+        shape = [1] * len(propositions)
+        shape[i] = 2
+        axes[proposition] = np.array([False, True]).reshape(shape)
+    return np.broadcast_to(_values(expression, axes), (2,) * len(propositions)).copy()
+
+
+def _values(expression: Expression, axes: dict[Proposition, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    match expression:
+        case AtomRef() | Equal():
+            return axes[expression]
         case Not(operand):
             return np.asarray(~_values(operand, axes))
         case All(operands) | Any(operands):
@@ -121,8 +145,8 @@ def _values(expression: Expression, axes: dict[int, NDArray[np.bool_]]) -> NDArr
             return start
         case Iff(left, right):
             return np.asarray(_values(left, axes) == _values(right, axes))
-        case Equal() | Exists() | Count():
-            raise AssertionError("decided before")
+        case Exists() | Count():
+            raise AssertionError("written out before")
         case _:
             assert_never(expression)
 

@@ -52,11 +52,6 @@ def diagram(worth: Float, steps: Int32) -> Diagram | None:
     return _reachable(after[::-1], values, state[:1]) if state[0] >= 0 else None
 
 
-def steps_of(counts: Counts) -> Int32:
-    """Shape (m,), what each literal adds to the count."""
-    return np.ones(counts.literals.shape[1], np.int32)
-
-
 def _reachable(after: list[Int64], worth: Float, first: Int64) -> Diagram:
     """The diagram without states that no literals lead to."""
     kept, here = [], first
@@ -107,7 +102,7 @@ def chains_of(network: Network) -> list[Chains]:
             atom = np.abs(counts.literals[rows]) - 1
             scale = np.where(hard[rows], 1.0, weight[rows] * counts.count[rows])
             literals = network.variable[atom], network.value[atom], counts.literals[rows] > 0
-            found += [Chains(*literals, steps_of(counts), worth, scale)] if rows.any() else []
+            found += [Chains(*literals, counts.steps, worth, scale)] if rows.any() else []
     return found
 
 
@@ -200,7 +195,7 @@ def count_clauses(network: Network, free: int) -> Iterator[tuple[int, list[int]]
     hard = np.isposinf(network.weights)
     for counts in network.counts:
         rows = hard[counts.weight]
-        plan = diagram(allowed(counts), steps_of(counts)) if rows.any() else None
+        plan = diagram(allowed(counts), counts.steps) if rows.any() else None
         for weight, literals in zip(counts.weight[rows].tolist(), counts.literals[rows].tolist(), strict=True):
             if plan is None:
                 yield weight, []

@@ -81,6 +81,8 @@ def _can_wait(template: Template, evidence: Evidence) -> bool:
     constants = {name: np.flatnonzero(p.any(axis=0)).tolist() for name, p in evidence.present.items()}
     if not (template.weights > 0).all() or len(template.formula.free) < 2 or len(still_open) < 3:
         return False
+    if any(v.bound for v in template.formula.variables):
+        return False
     body = without_quantifiers(template.formula, constants).body
     false = cubes(body, False)
     return len(false) == 1 and all(isinstance(p, AtomRef | Equal) for p in false[0])

@@ -40,8 +40,8 @@ class Factors(NamedTuple):
         size: shape (n_factors,), how many states it has.
         value: log-weights, `FORBIDDEN` for hard formulas that are violated.
         weight: shape (n_factors,), index of each one's weight in the network.
-        counted: shape (n_factors,), whether the state is a number of true literals.
-        grouped: shape (n_factors,), whether it was a counting factor in the network.
+        counted: shape (n_factors,), whether the state is a sum over true literals, not a place in a table.
+        grouped: shape (n_factors,), whether it was a counting factor with equal steps in the network.
     """
 
     atom: Int64
@@ -166,7 +166,9 @@ def _kinds(network: Network) -> Iterator[_Rows]:
         true[0] = c.negated
         yield _rows(network, c.literals, true.astype(np.int64), c.weight, c.count)
     for n in network.counts:
-        yield replace(_rows(network, n.literals, n.true, n.weight, n.count), grouped=True)
+        rows = _rows(network, n.literals, n.true, n.weight, n.count)
+        base = (n.steps * (n.literals < 0)).sum(axis=1)
+        yield replace(rows, steps=rows.steps * n.steps, base=base.astype(np.int32), grouped=n.plain)
     for t in network.tables:
         k = t.atoms.shape[1]
         literals = (t.atoms + 1).astype(np.int32)

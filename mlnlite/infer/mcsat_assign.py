@@ -29,11 +29,11 @@ def assign(f: Factors, s: Slice, variable: int, atom: int, sign: int) -> bool:
             continue
         for u in range(f.use[a], f.use[a + 1]):
             i = f.factor[u]
-            s.left[i] -= sign
+            s.left[i] -= sign * abs(f.step[u])
             if not f.counted[i]:
                 s.part[i] += sign * f.step[u] * (a == atom)
             else:
-                s.part[i] += sign * ((f.step[u] > 0) == (a == atom))
+                s.part[i] += sign * abs(f.step[u]) * ((f.step[u] > 0) == (a == atom))
     if sign < 0:
         return fits
     for a in range(f.first[variable], f.first[variable + 1]):

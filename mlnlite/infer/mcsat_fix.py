@@ -35,11 +35,11 @@ def fix(f: Factors, s: Slice, owner: Int32, choices: Int32, atom: int, truth: bo
         s.fixed[a] = np.int32(truth if a == atom else not truth)
         for u in range(f.use[a], f.use[a + 1]):
             i = f.factor[u]
-            s.left[i] -= 1
+            s.left[i] -= abs(f.step[u])
             if not f.counted[i]:
                 s.part[i] += f.step[u] * s.fixed[a]
             else:
-                s.part[i] += (f.step[u] > 0) == (s.fixed[a] == 1)
+                s.part[i] += abs(f.step[u]) * ((f.step[u] > 0) == (s.fixed[a] == 1))
                 if s.least[i] > -np.inf and not waits[i]:
                     waits[i] = True
                     changed[n_changed] = i

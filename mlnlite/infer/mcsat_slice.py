@@ -19,8 +19,8 @@ class Slice(NamedTuple):
         low: shape (n_factors,), smallest allowed state.
         high: shape (n_factors,), largest allowed state.
         whole: shape (n_factors,), whether all states between are allowed.
-        part: shape (n_factors,), what is fixed of the state: number of true literals, or place in the table.
-        left: shape (n_factors,), number of atoms that are not fixed.
+        part: shape (n_factors,), what is fixed of the state: of the true literals, or of the place in the table.
+        left: shape (n_factors,), sum of the steps of the atoms that are not fixed.
         fixed: shape (n_atoms,), 1 true, 0 false, -1 not fixed.
     """
 
@@ -57,7 +57,7 @@ def cut(f: Factors, s: Slice, state: Int32, uniform: Float, queue: Int64) -> int
     n_queued = 0
     s.fixed[:] = -1
     for i in range(len(f.row)):
-        s.part[i], s.left[i] = 0, f.scope[i + 1] - f.scope[i]
+        s.part[i], s.left[i] = 0, f.size[i] - 1
         s.least[i] = f.value[f.row[i] + state[i]] + np.log(1.0 - uniform[i])
         s.low[i], s.high[i], n_allowed = f.size[i], -1, 0
         for k in range(f.size[i]):

@@ -26,8 +26,8 @@ def counts(network: Network, truth: Bool) -> Int64:
         holds = tables.truth[tuple(truth[tables.atoms].T.astype(np.int64))]
         np.add.at(total, tables.weight[holds], tables.count[holds])
     for group in network.counts:
-        n_true = (truth[np.abs(group.literals) - 1] == (group.literals > 0)).sum(axis=1)
-        np.add.at(total, group.weight, group.count * group.true[n_true])
+        state = (truth[np.abs(group.literals) - 1] == (group.literals > 0)) @ group.steps
+        np.add.at(total, group.weight, group.count * group.true[state])
     return total
 
 

@@ -133,7 +133,11 @@ def _without_zeros(network: Network) -> Network:
     for table in network.tables:
         keep = network.weights[table.weight] != 0
         tables.append(replace(table, atoms=table.atoms[keep], weight=table.weight[keep], count=table.count[keep]))
-    return replace(network, clauses=tuple(clauses), tables=tuple(tables))
+    counts = []
+    for group in network.counts:
+        keep = network.weights[group.weight] != 0
+        counts.append(replace(group, literals=group.literals[keep], weight=group.weight[keep], count=group.count[keep]))
+    return replace(network, clauses=tuple(clauses), tables=tuple(tables), counts=tuple(counts))
 
 
 def _number(evidence: Evidence, name: str, *constants: str) -> int:

@@ -185,7 +185,7 @@ def _n_true(
     literals = group.literals[chosen]
     holds = _truth(network, values, np.abs(literals) - 1, worlds) == (literals > 0)
     if isinstance(group, Counts):
-        return np.asarray(group.true[holds.sum(axis=2)])
+        return np.asarray(group.true[holds @ group.steps])
     return np.asarray(holds.any(axis=2) != group.negated, np.int64)
 
 

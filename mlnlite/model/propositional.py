@@ -77,20 +77,50 @@ def without_quantifiers(
 
 
 @dataclass(frozen=True, slots=True)
+class Counted:
+    """Whether between `low` and `high` of some cases are true; the i-th is a proposition of its own, `AtomRef(~i)`."""
+
+    cases: tuple[Expression, ...]
+    low: int
+    high: int
+
+
+def with_counted(
+    formula: Formula, constants: Mapping[str, Iterable[int]], decide: Callable[[AtomSchema], bool | None] = _open
+) -> tuple[Formula, tuple[Counted, ...]]:
+    """The formula with each outermost `EXIST` and `count` as one proposition over cases, its bindings.
+
+    Args: see `without_quantifiers`; what stands inside of a case is written out as there.
+
+    Returns:
+        The formula, whose `AtomRef(~i)` stands for the i-th counted proposition, and these.
+
+    Raises:
+        LimitReached: if that gives more atoms than is sensible.
+    """
+    atoms: dict[AtomSchema, int] = {}
+    counted: list[Counted] = []
+    writing = _Writing(formula, {k: tuple(v) for k, v in constants.items()}, decide, atoms, counted)
+    body = simplified(_written_out(writing, formula.body, Binding({})), {})
+    return replace(formula, atoms=tuple(atoms), body=body), tuple(counted)
+
+
+@dataclass(frozen=True, slots=True)
 class _Writing:
-    """The formula that is written out, and the atoms so far."""
+    """The formula that is written out, the atoms so far, and what is counted, if quantifiers are."""
 
     formula: Formula
     constants: Mapping[str, tuple[int, ...]]
     decide: Callable[[AtomSchema], bool | None]
     atoms: dict[AtomSchema, int]
+    counted: list[Counted] | None = None
 
 
 def _written_out(writing: _Writing, expression: Expression, binding: Binding) -> Expression:
-    formula, constants, atoms = writing.formula, writing.constants, writing.atoms
+    formula, atoms = writing.formula, writing.atoms
 
-    def inside(e: Expression, b: Binding = binding) -> Expression:
-        return _written_out(writing, e, b)
+    def inside(e: Expression) -> Expression:
+        return _written_out(writing, e, binding)
 
     match expression:
         case AtomRef(index):
@@ -112,15 +142,36 @@ def _written_out(writing: _Writing, expression: Expression, binding: Binding) ->
             return Any(tuple(map(inside, operands)))
         case Iff(left_side, right_side):
             return Iff(inside(left_side), inside(right_side))
-        case Exists(variables, body):
-            bindings = _bindings(formula, variables, constants)
-            return Any(tuple(inside(body, Binding({**binding.terms, **more})) for more in bindings))
-        case Count(variables, body, low, high):
-            bindings = _bindings(formula, variables, constants)
-            cases = [simplified(inside(body, Binding({**binding.terms, **more})), {}) for more in bindings]
-            return between(cases, low, len(cases) if high is None else high)
+        case Exists() | Count():
+            return _quantified(writing, expression, binding)
         case _:
             raise AssertionError(expression)
+
+
+def _quantified(writing: _Writing, expression: Exists | Count, binding: Binding) -> Expression:
+    """A quantifier written out over its cases, or as a counted proposition."""
+    inner = replace(writing, counted=None)
+    bindings = _bindings(writing.formula, expression.variables, writing.constants)
+    cases = [
+        simplified(_written_out(inner, expression.body, Binding({**binding.terms, **more})), {}) for more in bindings
+    ]
+    low, high = (1, None) if isinstance(expression, Exists) else (expression.low, expression.high)
+    high = len(cases) if high is None else high
+    if writing.counted is None:
+        return between(cases, low, high)
+    left, low, high = _undecided(cases, low, high)
+    if high < 0 or low > len(left):
+        return FALSE
+    if low == 0 and high >= len(left):
+        return TRUE
+    writing.counted.append(Counted(tuple(left), low, min(high, len(left))))
+    return AtomRef(~(len(writing.counted) - 1))
+
+
+def _undecided(cases: Sequence[Expression], low: int, high: int) -> tuple[list[Expression], int, int]:
+    """The cases that are not constants, and the bounds for them."""
+    certain = sum(case == TRUE for case in cases)
+    return [case for case in cases if case not in (TRUE, FALSE)], max(0, low - certain), high - certain
 
 
 def _bindings(
@@ -141,9 +192,7 @@ def between(cases: Sequence[Expression], low: int, high: int) -> Expression:
     >>> between([a, b], 1, 2) == Any((a, b)), between([a, b, TRUE], 3, 3) == All((a, b))
     (True, True)
     """
-    certain = sum(case == TRUE for case in cases)
-    left = [case for case in cases if case not in (TRUE, FALSE)]
-    low, high = max(0, low - certain), high - certain
+    left, low, high = _undecided(cases, low, high)
     if high < 0 or low > len(left):
         return FALSE
     if low == len(left):

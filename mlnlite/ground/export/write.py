@@ -15,6 +15,7 @@ from mlnlite.ground.export.text import text
 from mlnlite.ground.export.uai import uai
 from mlnlite.ground.export.wcnf import wcnf
 from mlnlite.ground.network import Network
+from mlnlite.ground.patterns import without_counts
 
 FORMATS: Mapping[str, Callable[[Network], str]] = {
     ".txt": text,
@@ -30,7 +31,7 @@ def export(network: Network, path: str | os.PathLike[str]) -> None:
     """Writes a network to a file, whole or not at all.
 
     Args:
-        network: without counting factors.
+        network: what was ground; counting factors become tables.
         path: its ending says the format: `.txt` (ground formulas), `.wcnf` (MaxSAT), `.uai` (Markov network), `.cfn`
             (toulbar2), `.dot` (Graphviz), `.graphml`, `.parquet` (a table of literals).
 
@@ -43,6 +44,7 @@ def export(network: Network, path: str | os.PathLike[str]) -> None:
         raise QueryMistake(f"{target.name} ends in none of {', '.join([*FORMATS, '.parquet'])}")
     if not target.absolute().parent.is_dir():
         raise QueryMistake(f"there is no folder {target.absolute().parent}")
+    network = without_counts(network)
     with NamedTemporaryFile(dir=target.absolute().parent, suffix=target.suffix, delete=False) as file:
         temporary = Path(file.name)
     try:
