@@ -20,7 +20,7 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
     blocks: for each variable ("", 1), ("!", number of atoms) or ("?", number of atoms).
     clauses: (list of (literals, weight index, count), negated), literals of equal length.
     tables: (truth, list of (atoms, weight index, count)).
-    counts: (true groundings at each state, list of (literals, weight index, count), steps).
+    counts: (true groundings at each state, list of (literals, weight index, count), and steps if they are not 1).
     """
     variable, value, cardinality, is_block = [], [], [], []
     for v, (marker, n) in enumerate(blocks):
@@ -38,8 +38,8 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
         for truth, rows in tables
     ]
     count_blocks = [
-        Counts(np.array([r[0] for r in rows], np.int32), np.array(true, np.int64), *_columns(rows), np.int32(steps))
-        for true, rows, steps in counts
+        Counts(np.array([r[0] for r in rows], np.int32), np.array(true, np.int64), *_columns(rows), _steps(rows, *steps))
+        for true, rows, *steps in counts
     ]
     decided = np.zeros(n_weights, np.int64) if decided_true is None else np.array(decided_true, np.int64)
     total = decided + (0 if undecided_false is None else np.array(undecided_false, np.int64))
@@ -63,6 +63,10 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
 
 def _columns(rows):
     return np.array([r[1] for r in rows], np.int32), np.array([r[2] for r in rows], np.int64)
+
+
+def _steps(rows, steps=None):
+    return np.ones(len(rows[0][0]), np.int32) if steps is None else np.array(steps, np.int32)
 
 
 def worlds(net):

@@ -167,8 +167,8 @@ def _kinds(network: Network) -> Iterator[_Rows]:
         yield _rows(network, c.literals, true.astype(np.int64), c.weight, c.count)
     for n in network.counts:
         rows = _rows(network, n.literals, n.true, n.weight, n.count)
-        base = (n.steps * (n.literals < 0)).sum(axis=1)
-        yield replace(rows, steps=rows.steps * n.steps, base=base.astype(np.int32), grouped=n.plain)
+        steps = rows.steps * n.steps
+        yield replace(rows, steps=steps, base=-np.minimum(steps, 0).sum(axis=1, dtype=np.int32), grouped=n.plain)
     for t in network.tables:
         k = t.atoms.shape[1]
         literals = (t.atoms + 1).astype(np.int32)
