@@ -38,7 +38,9 @@ def network(blocks, clauses=(), tables=(), weights=(), decided_true=None, undeci
         for truth, rows in tables
     ]
     count_blocks = [
-        Counts(np.array([r[0] for r in rows], np.int32), np.array(true, np.int64), *_columns(rows), _steps(rows, *steps))
+        Counts(
+            np.array([r[0] for r in rows], np.int32), np.array(true, np.int64), *_columns(rows), _steps(rows, *steps)
+        )
         for true, rows, *steps in counts
     ]
     decided = np.zeros(n_weights, np.int64) if decided_true is None else np.array(decided_true, np.int64)
