@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
+from mlnlite.source import Source
 from mlnlite.syntax import tree
+from mlnlite.syntax.facts import EvidenceProgram
+from mlnlite.syntax.rows import Rows
 
 VARIABLES = ("x", "y", "z", "a1", "p2", "someone", "v", "éa")
 PREDICATES = ("P", "Q", "Smokes", "isA", "P2", "Rain", "has_part", "vote", "ist-über")
@@ -181,16 +184,12 @@ def programs(draw, dialect):
 @st.composite
 def evidence_programs(draw):
     """Evidence of one or several databases, as reading makes it."""
-    atoms = st.tuples(st.sampled_from(PREDICATES), st.lists(constant_names, max_size=3).map(tuple), st.booleans())
+    truths = st.one_of(st.booleans(), st.sampled_from([0.0, 1.5, -0.25]))
+    atoms = st.tuples(st.sampled_from(PREDICATES), st.lists(constant_names, max_size=3).map(tuple), truths)
     databases = draw(st.lists(st.lists(atoms, max_size=5), min_size=1, max_size=3))
-    tables: dict[tuple[str, int], tree.FactTable] = {}
+    rows = Rows()
     for number, facts in enumerate(databases):
         for predicate, terms, truth in facts:
-            key = predicate, len(terms)
-            table = tables.setdefault(key, tree.FactTable(predicate, tuple([] for _ in terms), [], [], []))
-            for column, term in zip(table.columns, terms, strict=True):
-                column.append(term)
-            table.truth.append(truth)
-            table.database.append(number)
+            rows.add(Source("e.db", ""), (predicate, terms), truth, (number, 0))
     types = tuple(draw(st.lists(type_declarations, max_size=2)))
-    return tree.EvidenceProgram(tuple(tables.values()), types, len(databases))
+    return EvidenceProgram(tuple(rows.tables()), types, len(databases))

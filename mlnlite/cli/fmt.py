@@ -52,7 +52,7 @@ def _texts(path: Path, dialect: AnyDialect | None) -> tuple[str, str]:
     new = formatted(source.text)
     again = Source(source.name, new)
     if path.suffix == ".db":
-        same = parse_evidence(source, "standard") == parse_evidence(again, "standard")
+        same = parse_evidence(source) == parse_evidence(again)
     else:
         same = parse_model([source], dialect) == parse_model([again], dialect)
     if not same:

@@ -59,8 +59,8 @@ def _probability(model: Model, files: tuple[Path, ...], item: Test) -> float:
 
     facts = "\n".join(split_queries(item.given)) if item.given else ""
     sources = [*(read_source(path) for path in files), Source("<test>", facts)]
-    programs = [parse_evidence(source, model.dialect) for source in sources]
-    evidence = check_evidence(programs, sources, model, together=True)
+    programs = [parse_evidence(source) for source in sources]
+    evidence = check_evidence(programs, model, together=True)
     answer = ml.marginal(model, evidence, [item.query])
     if len(answer.names) != 1:
         message = f"{item.query} asks for {len(answer.names)} probabilities; a test asks for one"

@@ -22,7 +22,8 @@ from mlnlite.model.model import Model
 from mlnlite.results import MapState, Marginals
 from mlnlite.source import Source
 from mlnlite.syntax.evidence import parse_evidence
-from mlnlite.syntax.tree import Constant, EvidenceProgram, TypeDeclaration
+from mlnlite.syntax.facts import EvidenceProgram
+from mlnlite.syntax.tree import Constant, TypeDeclaration
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,7 @@ class Session:
             return np.array(numbers, np.int64), np.ones(len(numbers), np.bool_)
         source = Source("<facts>", facts)
         model = replace(self.network.model, types=evidence.types, templates=())
-        checked = check_evidence([parse_evidence(source, model.dialect)], [source], model)
+        checked = check_evidence([parse_evidence(source)], model)
         _verify_constants(evidence, checked)
         found = [
             (evidence.atom_number(name, table.arguments), table.truth)
@@ -107,7 +108,7 @@ def compile(
         EvidenceMistake: if a predicate or type is unknown.
     """
     declared = tuple(TypeDeclaration(t, tuple(map(Constant, names))) for t, names in (constants or {}).items())
-    evidence = check_evidence([EvidenceProgram((), declared, 1)], [Source("<constants>", "")], model)
+    evidence = check_evidence([EvidenceProgram((), declared, 1)], model)
     for name in evidence_predicates:
         if name not in model.predicates:
             hint = did_you_mean(name, list(model.predicates))

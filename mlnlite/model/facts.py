@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import repeat
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean, in_order
-from mlnlite.model.coded import Coded, CodedTable
 from mlnlite.model.derived import compared, verify_constants
 from mlnlite.model.evidence import Evidence, Facts, SoftFacts
 from mlnlite.model.model import Model
-from mlnlite.model.soft import SoftColumns, soft_facts
+from mlnlite.model.soft import SoftColumns, place, soft_mistakes
 from mlnlite.model.symbols import Predicate, Type
 from mlnlite.source import Source, Span
-from mlnlite.syntax.tree import EvidenceProgram, FactTable, SoftFact
+from mlnlite.syntax.facts import EvidenceProgram, FactTable
 
 MOST_MISTAKES = 50
 """Mistakes reported for one predicate of one file; more are counted."""
@@ -30,7 +31,7 @@ class _Columns:
     database: list[NDArray[np.int32]] = field(default_factory=list)
     arguments: list[NDArray[np.int32]] = field(default_factory=list)
     truth: list[NDArray[np.bool_]] = field(default_factory=list)
-    file: list[NDArray[np.int32]] = field(default_factory=list)
+    file: list[int] = field(default_factory=list)
     offset: list[NDArray[np.int64]] = field(default_factory=list)
 
 
@@ -38,46 +39,45 @@ class _Columns:
 class _Reading:
     predicates: Mapping[str, Predicate]
     types: dict[str, dict[str, int]]
-    sources: list[Source]
+    sources: list[Source] = field(default_factory=list)
     declared: list[tuple[int, int, str, list[int]]] = field(default_factory=list)
     columns: dict[str, _Columns] = field(default_factory=dict)
     soft: dict[str, SoftColumns] = field(default_factory=dict)
     cuts: dict[tuple[str, int], tuple[float, ...]] = field(default_factory=dict)
     mistakes: list[Diagnostic] = field(default_factory=list)
 
-    def ids(self, type_name: str, column: Iterable[str]) -> NDArray[np.int32]:
+    def ids(self, type_name: str, names: Sequence[str]) -> NDArray[np.int32]:
         """Ids of constants, new ones for those not seen before."""
         index = self.types[type_name]
-        try:
-            return np.fromiter(map(index.__getitem__, column), np.int32)
-        except KeyError:
-            for name in column:
-                index.setdefault(name, len(index))
-            return np.fromiter(map(index.__getitem__, column), np.int32)
+        found = np.fromiter(map(index.get, names, repeat(-1)), np.int32, len(names))
+        for i in np.flatnonzero(found < 0).tolist():
+            found[i] = index.setdefault(names[i], len(index))
+        return found
 
 
 @dataclass(frozen=True, slots=True)
 class TableFacts:
-    """A table as a program of evidence: one database."""
+    """A table as a program of evidence: one database; for each argument its cut points, if it was divided into bins."""
 
-    facts: tuple[CodedTable, ...]
-    types: tuple[()] = ()
-    n_databases: int = 1
-    soft: tuple[()] = ()
+    table: FactTable
+    cuts: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+
+    types: ClassVar[tuple[()]] = ()
+    n_databases: ClassVar[int] = 1
+
+    @property
+    def facts(self) -> tuple[FactTable]:
+        """As a program has them."""
+        return (self.table,)
 
 
 def check_evidence(
-    programs: Sequence[EvidenceProgram | TableFacts],
-    sources: Sequence[Source],
-    model: Model,
-    *,
-    together: bool = False,
+    programs: Sequence[EvidenceProgram | TableFacts], model: Model, *, together: bool = False
 ) -> Evidence:
     """The evidence that files and tables mean.
 
     Args:
         programs: one for each file; all tables are about one world, the last of them.
-        sources: their texts, for messages.
         model: what the facts are about.
         together: the files describe one world and have one database each; otherwise each database is a world.
 
@@ -85,14 +85,14 @@ def check_evidence(
         EvidenceMistake: with every mistake in all files.
     """
     types = {name: dict(t.index) for name, t in model.types.items()}
-    reading = _Reading(model.predicates, types, list(sources))
+    reading = _Reading(model.predicates, types)
     first = 0
-    for file, program in enumerate(programs):
+    for program in programs:
         if together and program.n_databases > 1:
             hint = "name the one you mean, or learn from them"
-            message = f"{sources[file].name} has {program.n_databases} databases; together with others, each has one"
+            message = f"{_name(program)} has {program.n_databases} databases; together with others, each has one"
             reading.mistakes.append(Diagnostic("E310", message, hint=hint))
-        _read_file(program, file, first, reading)
+        _read_file(program, first, reading)
         first += 0 if together or isinstance(program, TableFacts) else program.n_databases
     tabled = any(isinstance(p, TableFacts) for p in programs)
     n_databases = 1 if together else first + tabled
@@ -103,12 +103,7 @@ def check_evidence(
         raise EvidenceMistake(in_order(reading.mistakes))
     present = _present(model, result_types, facts, n_databases, reading)
     facts |= compared(model, result_types, present)
-    names = [
-        f"{s.name}#{i + 1}"
-        for s, p in zip(sources, programs, strict=True)
-        if not isinstance(p, TableFacts)
-        for i in range(p.n_databases)
-    ]
+    names = [f"{_name(p)}#{i + 1}" for p in programs if not isinstance(p, TableFacts) for i in range(p.n_databases)]
     return Evidence(
         result_types,
         dict(model.predicates),
@@ -121,6 +116,13 @@ def check_evidence(
     )
 
 
+def _name(program: EvidenceProgram | TableFacts) -> str:
+    """The file of a program."""
+    if isinstance(program, TableFacts):
+        return program.table.source.name
+    return program.span.source.name if program.span else "<no evidence>"
+
+
 def _softened(reading: _Reading, facts: Mapping[str, Facts], model: Model) -> dict[str, SoftFacts]:
     """The soft facts.
 
@@ -130,8 +132,10 @@ def _softened(reading: _Reading, facts: Mapping[str, Facts], model: Model) -> di
     mistakes: list[Diagnostic] = []
     soft = {}
     for name, columns in reading.soft.items():
-        place = [_fact_span(reading.sources[f], o) for f, o in columns.places]
-        soft[name] = soft_facts(columns, model.predicates[name], facts[name], place, mistakes)
+        soft[name] = columns.facts()
+        for i, code, message, hint in soft_mistakes(soft[name], model.predicates[name], facts[name]):
+            file, offset = place(columns, i)
+            mistakes.append(Diagnostic(code, message, _fact_span(reading.sources[file], offset), hint))
     if mistakes:
         raise EvidenceMistake(in_order(mistakes))
     return soft
@@ -139,7 +143,7 @@ def _softened(reading: _Reading, facts: Mapping[str, Facts], model: Model) -> di
 
 def no_evidence(model: Model) -> Evidence:
     """Evidence in which nothing is known."""
-    return check_evidence([EvidenceProgram((), (), 1)], [Source("<no evidence>", "")], model)
+    return check_evidence([EvidenceProgram((), (), 1)], model)
 
 
 def closed(evidence: Evidence, predicates: Iterable[str]) -> Evidence:
@@ -160,7 +164,7 @@ def closed(evidence: Evidence, predicates: Iterable[str]) -> Evidence:
 # --- one file
 
 
-def _read_file(program: EvidenceProgram | TableFacts, file: int, first: int, reading: _Reading) -> None:
+def _read_file(program: EvidenceProgram | TableFacts, first: int, reading: _Reading) -> None:
     for declaration in program.types:
         if declaration.name not in reading.types:
             hint = did_you_mean(declaration.name, list(reading.types))
@@ -170,9 +174,9 @@ def _read_file(program: EvidenceProgram | TableFacts, file: int, first: int, rea
         ids = reading.ids(declaration.name, [c.name for c in declaration.constants])
         reading.declared.append((first, first + program.n_databases, declaration.name, ids.tolist()))
     for table in program.facts:
-        _read_table(table, file, first, reading)
-    for fact in program.soft:
-        _read_soft(fact, file, first, reading)
+        _read_table(table, first, reading)
+    if isinstance(program, TableFacts):
+        _mention(program, first, reading)
 
 
 def _predicate(name: str, arity: int, reading: _Reading) -> Predicate | tuple[str, str, str]:
@@ -186,62 +190,41 @@ def _predicate(name: str, arity: int, reading: _Reading) -> Predicate | tuple[st
     return predicate
 
 
-def _read_soft(fact: SoftFact, file: int, first: int, reading: _Reading) -> None:
-    predicate = _predicate(fact.predicate, len(fact.arguments), reading)
-    if isinstance(predicate, tuple):
-        code, message, hint = predicate
-        reading.mistakes.append(Diagnostic(code, message, fact.span, hint))
-        return
-    ids = [int(reading.ids(t, [a])[0]) for t, a in zip(predicate.types, fact.arguments, strict=True)]
-    weight = math.log(fact.probability / (1 - fact.probability))
-    columns = reading.soft.setdefault(predicate.name, SoftColumns())
-    columns.add([fact.database + first], [ids], [weight], [(file, fact.span.start if fact.span else 0)])
-
-
-def _ids(type_name: str, column: list[str] | Coded, reading: _Reading) -> NDArray[np.int32]:
-    if isinstance(column, Coded):
-        return np.asarray(reading.ids(type_name, column.names)[column.codes], np.int32)
-    return reading.ids(type_name, column)
-
-
-def _read_table(table: FactTable | CodedTable, file: int, first: int, reading: _Reading) -> None:
+def _read_table(table: FactTable, first: int, reading: _Reading) -> None:
     predicate = _predicate(table.predicate, len(table.columns), reading)
     if isinstance(predicate, tuple):
-        if isinstance(table, FactTable):
-            _each(table, file, *predicate, reading)
+        _each(table, *predicate, reading)
         return
     arguments = np.empty((len(table.truth), predicate.arity), np.int32)
-    columns: Sequence[list[str] | Coded] = table.columns
-    for i, (type_name, column) in enumerate(zip(predicate.types, columns, strict=True)):
-        arguments[:, i] = _ids(type_name, column, reading)
-    if isinstance(table, CodedTable):
-        _mention(table, predicate, first, reading)
-        if table.soft is not None:
-            places = [(file, int(o)) for o in table.offset]
-            soft = reading.soft.setdefault(predicate.name, SoftColumns())
-            soft.add(table.database + first, arguments, table.soft, places)
-            return
-    known = reading.columns.setdefault(predicate.name, _Columns())
-    known.database.append(np.asarray(table.database, np.int32) + np.int32(first))
-    known.arguments.append(arguments)
-    known.truth.append(np.asarray(table.truth, np.bool_))
-    known.file.append(np.full(len(arguments), file, np.int32))
-    known.offset.append(np.asarray(table.offset, np.int64))
-
-
-def _mention(table: CodedTable, predicate: Predicate, first: int, reading: _Reading) -> None:
-    """Notes the constants of all rows, those that say nothing included, and cut points."""
     for i, (type_name, column) in enumerate(zip(predicate.types, table.columns, strict=True)):
+        arguments[:, i] = reading.ids(type_name, column.names)[column.codes]
+    file, database = len(reading.sources), table.database + np.int32(first)
+    reading.sources.append(table.source)
+    if table.weight is not None:
+        soft = reading.soft.setdefault(predicate.name, SoftColumns())
+        soft.add(database, arguments, table.weight, file, table.offset)
+        return
+    known = reading.columns.setdefault(predicate.name, _Columns())
+    known.database.append(database)
+    known.arguments.append(arguments)
+    known.truth.append(table.truth)
+    known.file.append(file)
+    known.offset.append(table.offset)
+
+
+def _mention(program: TableFacts, first: int, reading: _Reading) -> None:
+    """Notes the constants of all rows of a table, those that say nothing included, and cut points."""
+    predicate = reading.predicates[program.table.predicate]
+    for type_name, column in zip(predicate.types, program.table.columns, strict=True):
         ids = reading.ids(type_name, column.names)
         reading.declared.append((first, first + 1, type_name, ids.tolist()))
-        if i in table.cuts:
-            reading.cuts[predicate.name, i] = table.cuts[i]
+    reading.cuts.update({(predicate.name, i): points for i, points in program.cuts.items()})
 
 
-def _each(table: FactTable, file: int, code: str, message: str, hint: str, reading: _Reading) -> None:
+def _each(table: FactTable, code: str, message: str, hint: str, reading: _Reading) -> None:
     """The same mistake for every fact of a table."""
-    for offset in table.offset[:MOST_MISTAKES]:
-        reading.mistakes.append(Diagnostic(code, message, _fact_span(reading.sources[file], offset), hint))
+    for offset in table.offset[:MOST_MISTAKES].tolist():
+        reading.mistakes.append(Diagnostic(code, message, _fact_span(table.source, offset), hint))
     more = len(table.offset) - MOST_MISTAKES
     if more > 0:
         reading.mistakes.append(Diagnostic(code, f"{message} ({more} more facts)"))
@@ -262,50 +245,77 @@ def _sorted(name: str, reading: _Reading) -> Facts:
     columns = reading.columns.get(name)
     if columns is None:
         return Facts(np.empty(0, np.int32), np.empty((0, predicate.arity), np.int32), np.empty(0, np.bool_))
-    database, arguments = np.concatenate(columns.database), np.concatenate(columns.arguments)
-    order = np.lexsort((*reversed(arguments.T), database))
-    database, arguments, truth = database[order], arguments[order], np.concatenate(columns.truth)[order]
-    file, offset = np.concatenate(columns.file)[order], np.concatenate(columns.offset)[order]
-    again = np.zeros(len(order), bool)
-    again[1:] = (database[1:] == database[:-1]) & (arguments[1:] == arguments[:-1]).all(axis=1)
-    for i in np.flatnonzero(again & (truth != np.roll(truth, 1)))[:MOST_MISTAKES]:
-        _contradiction(predicate, reading.sources, file[i - 1 : i + 1], offset[i - 1 : i + 1], reading.mistakes)
-    keep = ~again
-    facts = Facts(database[keep], arguments[keep], truth[keep])
+    database, arguments, truth = map(np.concatenate, (columns.database, columns.arguments, columns.truth))
+    order, again = _order(database, arguments, [len(reading.types[t]) for t in predicate.types])
+    if order is not None:
+        database, arguments, truth = database[order], arguments[order], truth[order]
+    where = _Places(columns, order)
+    for i in np.flatnonzero(again & (truth != np.roll(truth, 1)))[:MOST_MISTAKES].tolist():
+        first, second = where.spans([i - 1, i], reading.sources)
+        message = f"this fact about {predicate.name} contradicts the one at {first.place}"
+        hint = "an atom is true or false; remove one of the two"
+        reading.mistakes.append(Diagnostic("E304", message, second, hint))
+    kept = np.flatnonzero(~again)
+    if len(kept) < len(again):
+        database, arguments, truth = database[kept], arguments[kept], truth[kept]
+    facts = Facts(database, arguments, truth)
     if predicate.value is not None:
-        _check_blocks(predicate, facts, (file[keep], offset[keep]), reading)
+        for pair in _second_values(predicate, facts):
+            first, second = where.spans(kept[pair].tolist(), reading.sources)
+            some = "exactly one value is" if predicate.marker == "!" else "at most one value can be"
+            message = f"this is a second value; the first is at {first.place}"
+            reading.mistakes.append(Diagnostic("E305", message, second, f"of {predicate}, {some} true"))
     return facts
 
 
-def _contradiction(
-    predicate: Predicate,
-    sources: list[Source],
-    file: NDArray[np.int32],
-    offset: NDArray[np.int64],
-    mistakes: list[Diagnostic],
-) -> None:
-    spans = [_fact_span(sources[f], int(o)) for f, o in zip(file, offset, strict=True)]
-    first, second = sorted(spans, key=lambda s: (s.source.name, s.start))
-    message = f"this fact about {predicate.name} contradicts the one at {first.place}"
-    mistakes.append(Diagnostic("E304", message, second, "an atom is true or false; remove one of the two"))
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Where facts stand, in their order."""
+
+    columns: _Columns
+    order: NDArray[np.int64] | None
+
+    def spans(self, rows: Sequence[int], sources: Sequence[Source]) -> list[Span]:
+        """The places of some of them, the first one first."""
+        found = []
+        for row in rows if self.order is None else self.order[rows].tolist():
+            file, offset = place(self.columns, row)
+            found.append(_fact_span(sources[file], offset))
+        return sorted(found, key=lambda s: (s.source.name, s.start))
 
 
-def _check_blocks(
-    predicate: Predicate, facts: Facts, where: tuple[NDArray[np.int32], NDArray[np.int64]], reading: _Reading
-) -> None:
-    """Two true values in one block of a functional predicate are a mistake."""
+def _order(
+    database: NDArray[np.int32], arguments: NDArray[np.int32], sizes: Sequence[int]
+) -> tuple[NDArray[np.int64] | None, NDArray[np.bool_]]:
+    """The order of rows by database and arguments (None: they are in order), and which of them then repeat the last.
+
+    Rows become numbers of one mixed radix, as long as these fit into 64 bits.
+    """
+    again = np.zeros(len(database), bool)
+    if int(database.max(initial=0) + 1) * math.prod(sizes) < 2**63:
+        number = database.astype(np.int64)
+        for column, size in zip(arguments.T, sizes, strict=True):
+            number = number * size + column
+        if (number[1:] > number[:-1]).all():
+            return None, again
+        order = np.argsort(number, kind="stable")
+        number = number[order]
+        again[1:] = number[1:] == number[:-1]
+        return order, again
+    order = np.lexsort((*reversed(arguments.T), database))
+    database, arguments = database[order], arguments[order]
+    again[1:] = (database[1:] == database[:-1]) & (arguments[1:] == arguments[:-1]).all(axis=1)
+    return order, again
+
+
+def _second_values(predicate: Predicate, facts: Facts) -> NDArray[np.int64]:
+    """Pairs of true facts about one block of a functional predicate: shape (n, 2), `MOST_MISTAKES` at most."""
     true = np.flatnonzero(facts.truth)
     keys = np.column_stack([facts.database, facts.arguments[:, list(predicate.keys)]])[true]
     order = np.lexsort(tuple(reversed(keys.T)))
     keys, true = keys[order], true[order]
-    twice = np.flatnonzero((keys[1:] == keys[:-1]).all(axis=1))
-    for i in twice[:MOST_MISTAKES]:
-        file, offset = (a[true[i : i + 2]] for a in where)
-        spans = [_fact_span(reading.sources[f], int(o)) for f, o in zip(file, offset, strict=True)]
-        first, second = sorted(spans, key=lambda s: (s.source.name, s.start))
-        some = "exactly one value is" if predicate.marker == "!" else "at most one value can be"
-        message = f"this is a second value; the first is at {first.place}"
-        reading.mistakes.append(Diagnostic("E305", message, second, f"of {predicate}, {some} true"))
+    twice = np.flatnonzero((keys[1:] == keys[:-1]).all(axis=1))[:MOST_MISTAKES]
+    return np.column_stack([true[twice], true[twice + 1]])
 
 
 # --- constants
@@ -325,7 +335,9 @@ def _present(
     for predicate in model.predicates.values():
         table = facts[predicate.name]
         for i, name in enumerate(predicate.types):
-            present[name][table.database, table.arguments[:, i]] = True
+            present[name].reshape(-1)[table.database * np.int64(len(types[name].constants)) + table.arguments[:, i]] = (
+                True
+            )
         if predicate.name in reading.soft:
             soft = reading.soft[predicate.name].facts()
             for i, name in enumerate(predicate.types):

@@ -20,9 +20,10 @@ from mlnlite.model.soft import of_database
 from mlnlite.model.table import Table, read_mapping
 from mlnlite.source import Source
 from mlnlite.syntax.evidence import parse_evidence
+from mlnlite.syntax.facts import EvidenceProgram
 from mlnlite.syntax.files import read_source
 from mlnlite.syntax.parse import parse_what_can_be_read
-from mlnlite.syntax.tree import AnyDialect, EvidenceProgram, Program
+from mlnlite.syntax.tree import AnyDialect, Program
 
 Path: TypeAlias = str | PathLike[str]
 
@@ -127,8 +128,8 @@ def evidence_from_text(text: str, *, model: Model) -> Evidence:
 def _evidence(
     texts: Sequence[Source], model: Model, *, together: bool, tables: Sequence[tuple[str, Table]] = ()
 ) -> Evidence:
-    programs: list[EvidenceProgram | TableFacts] = [parse_evidence(source, model.dialect) for source in texts]
-    sources, warnings = list(texts), []
+    programs: list[EvidenceProgram | TableFacts] = [parse_evidence(source) for source in texts]
+    warnings: list[Diagnostic] = []
     for name, table in tables:
         predicate = model.predicates.get(name)
         if predicate is None:
@@ -136,11 +137,10 @@ def _evidence(
             raise EvidenceMistake([Diagnostic("E302", f"the predicate {name} is not declared", hint=hint)])
         from mlnlite.model.tabular import read_table
 
-        coded, source, found = read_table(predicate, table)
-        programs.append(TableFacts((coded,)))
-        sources.append(source)
+        facts, found = read_table(predicate, table)
+        programs.append(facts)
         warnings += found
-    evidence = check_evidence(programs, sources, model, together=together)
+    evidence = check_evidence(programs, model, together=together)
     return replace(evidence, warnings=evidence.warnings + tuple(warnings)) if warnings else evidence
 
 

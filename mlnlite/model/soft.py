@@ -2,59 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from mlnlite.errors import Diagnostic
 from mlnlite.model.evidence import Evidence, Facts, SoftFacts
 from mlnlite.model.formulas import AtomRef, AtomSchema, Formula, TypedVariable, Var
 from mlnlite.model.symbols import Predicate
 from mlnlite.model.templates import Template
-from mlnlite.source import Span
 
 
 @dataclass(slots=True)
 class SoftColumns:
-    """Soft facts about one predicate, in the order of reading; `places` are number of the source and offset in it."""
+    """Soft facts about one predicate, in the order of reading; `file` and `offset` say where each stands."""
 
     database: list[NDArray[np.int32]] = field(default_factory=list)
     arguments: list[NDArray[np.int32]] = field(default_factory=list)
     weight: list[NDArray[np.float64]] = field(default_factory=list)
-    places: list[tuple[int, int]] = field(default_factory=list)
+    file: list[int] = field(default_factory=list)
+    offset: list[NDArray[np.int64]] = field(default_factory=list)
 
     def add(
-        self, database: ArrayLike, arguments: ArrayLike, weight: ArrayLike, places: Sequence[tuple[int, int]]
+        self,
+        database: NDArray[np.int32],
+        arguments: NDArray[np.int32],
+        weight: NDArray[np.float64],
+        file: int,
+        offset: NDArray[np.int64],
     ) -> None:
-        """Adds some facts, one for each place."""
-        self.database.append(np.asarray(database, np.int32))
-        self.arguments.append(np.asarray(arguments, np.int32).reshape(len(places), -1))
-        self.weight.append(np.asarray(weight, np.float64))
-        self.places += places
+        """Adds some facts of one source."""
+        self.database.append(database)
+        self.arguments.append(arguments)
+        self.weight.append(weight)
+        self.file.append(file)
+        self.offset.append(offset)
 
     def facts(self) -> SoftFacts:
         """All of them."""
         return SoftFacts(np.concatenate(self.database), np.concatenate(self.arguments), np.concatenate(self.weight))
 
 
-def soft_facts(
-    columns: SoftColumns, predicate: Predicate, certain: Facts, spans: Sequence[Span], mistakes: list[Diagnostic]
-) -> SoftFacts:
-    """The soft facts about a predicate; adds a mistake if it is closed, or if an atom is certain."""
-    soft = columns.facts()
+def place(columns: Any, row: int) -> tuple[int, int]:  # noqa: ANN401
+    """Number of the source of a fact, and its offset there; `columns` has these in pieces, as `SoftColumns` does."""
+    for file, offset in zip(columns.file, columns.offset, strict=True):
+        if row < len(offset):
+            return file, int(offset[row])
+        row -= len(offset)
+    raise IndexError(row)
+
+
+def soft_mistakes(soft: SoftFacts, predicate: Predicate, certain: Facts) -> Iterator[tuple[int, str, str, str]]:
+    """What is wrong with soft facts: which one, code, message and hint."""
     if predicate.closed:
         message = f"the world of {predicate.name} is closed, and this fact leaves an atom open"
-        hint = "remove the star from its declaration, or use --open-world"
-        mistakes.append(Diagnostic("E315", message, spans[0], hint))
-        return soft
+        yield 0, "E315", message, "remove the star from its declaration, or use --open-world"
+        return
+    if not len(certain.truth):
+        return
     known = {row.tobytes() for row in np.column_stack([certain.database, certain.arguments]).astype(np.int32)}
-    for i, row in enumerate(np.column_stack([soft.database, soft.arguments]).astype(np.int32) if known else ()):
+    for i, row in enumerate(np.column_stack([soft.database, soft.arguments]).astype(np.int32)):
         if row.tobytes() in known:
             message = f"this fact about {predicate.name} is certain elsewhere and uncertain here"
-            mistakes.append(Diagnostic("E313", message, spans[i], "remove one of the two"))
-    return soft
+            yield i, "E313", message, "remove one of the two"
 
 
 def soft_templates(evidence: Evidence) -> Iterator[Template]:

@@ -14,9 +14,12 @@ from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean
 from mlnlite.model.bins import cut_points, numbered
-from mlnlite.model.coded import Coded, CodedTable, Int64, RowSource
+from mlnlite.model.facts import TableFacts
+from mlnlite.model.rowsource import RowSource
 from mlnlite.model.symbols import Predicate
 from mlnlite.model.table import Table
+from mlnlite.syntax.coded import Coded
+from mlnlite.syntax.facts import FactTable
 
 READERS = {
     ".csv": "read_csv({}, all_varchar=true, header=true)",
@@ -29,8 +32,8 @@ READERS = {
 ROWS_AT_ONCE = 65_536
 
 
-def read_table(predicate: Predicate, table: Table) -> tuple[CodedTable, RowSource, list[Diagnostic]]:
-    """The facts of a table, the source that messages name, and warnings.
+def read_table(predicate: Predicate, table: Table) -> tuple[TableFacts, list[Diagnostic]]:
+    """The facts of a table, and warnings.
 
     Raises:
         EvidenceMistake: it cannot be read, or its columns do not fit the predicate.
@@ -106,7 +109,7 @@ def _name(value: str) -> str:
 
 def _read(
     connection: duckdb.DuckDBPyConnection, predicate: Predicate, table: Table, name: str
-) -> tuple[CodedTable, RowSource, list[Diagnostic]]:
+) -> tuple[TableFacts, list[Diagnostic]]:
     types = {row[0]: row[1] for row in connection.execute("DESCRIBE source").fetchall()}
     special = {role: _special(role, table, list(types), name) for role in ("truth", "probability", "weight")}
     arguments = _arguments(predicate, table, list(types), {c for c in special.values() if c}, name)
@@ -121,9 +124,9 @@ def _read(
     rows = np.flatnonzero(says)
     kept = tuple(Coded(c.names, c.codes[rows]) for c in columns)
     database, softness = np.zeros(len(rows), np.int32), None if soft is None else soft[rows]
-    coded = CodedTable(predicate.name, kept, truth[rows], database, rows, softness, cuts)
-    warnings = list(_warnings(columns, arguments, len(says), rows, name))
-    return coded, RowSource(name, "", columns, predicate.name), warnings
+    source = RowSource(name, "", columns, predicate.name)
+    facts = FactTable(predicate.name, kept, truth[rows], database, softness, rows, source)
+    return TableFacts(facts, cuts), list(_warnings(columns, arguments, len(says), rows, name))
 
 
 def _special(role: str, table: Table, names: Sequence[str], where: str) -> str | None:
@@ -172,11 +175,11 @@ def _coded(connection: duckdb.DuckDBPyConnection, index: int) -> Coded:
     names = connection.execute(every).fetchall()
     if not names:
         n_rows = connection.execute("SELECT count(*) FROM t").fetchall()[0][0]
-        return Coded([], np.full(n_rows, -1, np.int64))
+        return Coded([], np.full(n_rows, -1, np.int32))
     connection.execute(f"CREATE TYPE e{index} AS ENUM ({every})")
     code = f"CAST(coalesce(CAST(enum_code(CAST({column} AS e{index})) AS BIGINT), -1) AS BIGINT)"
     codes = connection.execute(f"SELECT {code} AS code FROM t").fetchnumpy()["code"]
-    return Coded([row[0] for row in names], np.asarray(codes, np.int64))
+    return Coded([row[0] for row in names], np.asarray(codes, np.int32))
 
 
 def _truth(
@@ -217,7 +220,7 @@ def _log_odds(values: NDArray[np.float64], name: str) -> NDArray[np.float64]:
 
 
 def _warnings(
-    columns: Sequence[Coded], names: Sequence[str], n_rows: int, rows: Int64, where: str
+    columns: Sequence[Coded], names: Sequence[str], n_rows: int, rows: NDArray[np.int64], where: str
 ) -> Iterator[Diagnostic]:
     for column, name in zip(columns, names, strict=True):
         if name in column.names:

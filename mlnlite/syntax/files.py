@@ -28,12 +28,13 @@ def read_source(path: str | os.PathLike[str]) -> Source:
     """
     name = os.fspath(path)
     data = _bytes(name)
-    if not data.strip():
+    if not data or data.isspace():
         raise _refusal(mistake("E134", None, "a model or an evidence file has at least one line", path=name))
     zero = -1 if data.startswith(_UTF16) else data.find(b"\0")
     if zero >= 0:
         raise _refusal(mistake("E132", None, "give a .mln or .db text file", path=name, offset=zero))
-    return Source(name, _decoded(name, data).replace("\r\n", "\n").replace("\r", "\n"))
+    text = _decoded(name, data)
+    return Source(name, text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text)
 
 
 def _member(name: str, archive: str, wanted: str) -> bytes:

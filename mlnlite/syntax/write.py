@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import assert_never
+from typing import TYPE_CHECKING, assert_never
 
 from mlnlite.syntax import tree
 from mlnlite.syntax.build import is_variable
 from mlnlite.syntax.dialects import LOOKS_VARIABLE
 from mlnlite.syntax.statements import declares
 from mlnlite.syntax.walk import variables_of
+
+if TYPE_CHECKING:
+    from mlnlite.syntax.facts import EvidenceProgram, FactTable
 
 _WORD = re.compile(r"-?\w+(?:[-.]\w+)*")
 # Names that stand alone on the left of `=`, where a number would be taken for a weight.
@@ -56,25 +60,27 @@ def write_weight(weight: tree.WeightExpression) -> str:
     assert_never(weight)
 
 
-def write_evidence(evidence: tree.EvidenceProgram, dialect: tree.Dialect) -> str:
-    """The text of an evidence file, the same in both dialects: types, then the databases, `---` between them."""
+def write_evidence(evidence: EvidenceProgram) -> str:
+    """The text of an evidence file, the same in all dialects: types, then the databases, `---` between them."""
     lines = [_type(declaration) for declaration in evidence.types]
     facts: list[list[str]] = [[] for _ in range(evidence.n_databases)]
     for table in evidence.facts:
-        columns = [list(map(_constant, column)) for column in table.columns]
+        columns = [list(map(_constant, column.texts())) for column in table.columns]
         rows = zip(*columns, strict=True) if columns else iter([()] * len(table.truth))
-        for arguments, truth, database in zip(rows, table.truth, table.database, strict=True):
-            text = f"{table.predicate}({', '.join(arguments)})" if arguments else table.predicate
-            facts[database].append(text if truth else f"!{text}")
-    for soft in evidence.soft:
-        words = ", ".join(map(_constant, soft.arguments))
-        text = f"{soft.predicate}({words})" if soft.arguments else soft.predicate
-        facts[soft.database].append(f"?{text}" if soft.unknown else f"{soft.probability!r} {text}")
+        for arguments, sign, database in zip(rows, _signs(table), table.database.tolist(), strict=True):
+            facts[database].append(sign + table.predicate + (f"({', '.join(arguments)})" if arguments else ""))
     for number, database_lines in enumerate(facts):
         lines += ["---"] * (number > 0) + database_lines
     # A separator that nothing follows counts only if another one follows.
     lines += ["---"] * (len(facts) > 1 and not facts[-1])
     return "".join(f"{line}\n" for line in lines)
+
+
+def _signs(table: FactTable) -> list[str]:
+    """What stands in front of each fact."""
+    if table.weight is None:
+        return ["" if truth else "!" for truth in table.truth.tolist()]
+    return [f"{1 / (1 + math.exp(-w))!r} " if w else "?" for w in table.weight.tolist()]
 
 
 # --- words

@@ -24,7 +24,7 @@ def message(name: str) -> str:
     try:
         source = read_source(name)
         if name.endswith(".db"):
-            parse_evidence(source, "standard")
+            parse_evidence(source)
         else:
             check(parse_model([source]))
     except MlnError as error:

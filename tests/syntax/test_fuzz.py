@@ -60,7 +60,7 @@ def survives(text, dialect):
     began = time.perf_counter()
     for read in (
         lambda: ml.model_from_text(text, dialect=dialect),
-        lambda: parse_evidence(Source("e.db", text), "standard"),
+        lambda: parse_evidence(Source("e.db", text)),
         lambda: formatted(text),
     ):
         try:

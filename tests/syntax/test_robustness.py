@@ -37,7 +37,7 @@ def test_model(dialect, text):
 @settings(max_examples=120, deadline=None)
 @given(text=texts)
 def test_evidence(text):
-    check(lambda: parse_evidence(Source("e.db", text), "standard"), text)
+    check(lambda: parse_evidence(Source("e.db", text)), text)
 
 
 @settings(max_examples=60, deadline=None)
@@ -99,5 +99,5 @@ def test_many_mistakes_stop_the_reading():
     assert len(caught.value.diagnostics) == 101
     assert caught.value.diagnostics[-1].code == "E199"
     with pytest.raises(SyntaxMistake) as caught:
-        parse_evidence(Source("e.db", "P(\n" * 5000), "standard")
+        parse_evidence(Source("e.db", "P(\n" * 5000))
     assert len(caught.value.diagnostics) == 101

@@ -74,4 +74,4 @@ def test_weight(weight):
 @settings(max_examples=100, deadline=None)
 @given(evidence=evidence_programs())
 def test_evidence(evidence):
-    assert parse_evidence(Source("e.db", write_evidence(evidence, "prac")), "prac") == evidence
+    assert parse_evidence(Source("e.db", write_evidence(evidence))) == evidence
