@@ -245,7 +245,8 @@ def _sorted(name: str, reading: _Reading) -> Facts:
     columns = reading.columns.get(name)
     if columns is None:
         return Facts(np.empty(0, np.int32), np.empty((0, predicate.arity), np.int32), np.empty(0, np.bool_))
-    database, arguments, truth = map(np.concatenate, (columns.database, columns.arguments, columns.truth))
+    database, arguments = np.concatenate(columns.database), np.concatenate(columns.arguments)
+    truth = np.concatenate(columns.truth)
     order, again = _order(database, arguments, [len(reading.types[t]) for t in predicate.types])
     if order is not None:
         database, arguments, truth = database[order], arguments[order], truth[order]

@@ -168,7 +168,7 @@ def _blank(lines: _Lines, rows: Int64) -> Bool:
 
 def _line(lines: _Lines, at: Int64) -> Int64:
     """The lines in which bytes stand."""
-    return np.searchsorted(lines.marks[lines.first], at) - 1
+    return np.asarray(np.searchsorted(lines.marks[lines.first], at) - 1)
 
 
 def _stretches(known: Int64, others: Int64, n_lines: int) -> list[tuple[int, int]]:
@@ -197,7 +197,7 @@ def _misplaced(lines: _Lines) -> Int64:
     at = np.flatnonzero(lines.kinds == _JOINS)
     before, here, behind = lines.kinds[at - 1] != _NONE, lines.letters[at], lines.kinds[at + 1] == _PLAIN
     inside = (here == ord("'")) | (here == ord("$")) | (here == ord("~"))
-    return at[~np.where(inside, before, behind & (before | (here == ord("-"))))]
+    return np.asarray(at[~np.where(inside, before, behind & (before | (here == ord("-"))))])
 
 
 def _shapes(lines: _Lines) -> Iterator[Int64]:

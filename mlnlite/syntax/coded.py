@@ -25,8 +25,9 @@ class Coded:
 
     def __eq__(self, other: object) -> bool:
         """Whether the rows are the same."""
-        same = isinstance(other, Coded) and list(self.names) == list(other.names)
-        return same and np.array_equal(self.codes, other.codes)  # type: ignore[union-attr]
+        if not isinstance(other, Coded):
+            return False
+        return list(self.names) == list(other.names) and np.array_equal(self.codes, other.codes)
 
     __hash__ = None  # type: ignore[assignment]
 
