@@ -34,6 +34,7 @@ class Source:
         n_rows: its length.
         world: the column of the database, or None where there is one database only.
         counted: the counted propositions of the formula.
+        excluded: ends the names of the tables of facts that literals must not contradict; others only generate.
     """
 
     formula: Formula
@@ -43,6 +44,7 @@ class Source:
     n_rows: int
     world: str | None = None
     counted: tuple[Counted, ...] = ()
+    excluded: str = ""
 
     @property
     def tabled(self) -> bool:
@@ -141,7 +143,7 @@ def _parts(source: Source, cube: Cube) -> tuple[list[tuple[Plan, set[int], int]]
 
 
 def _excluded(source: Source, schema: AtomSchema, truth: bool) -> _Filter:
-    scan = Scan(f"{schema.predicate}.{'true' if truth else 'false'}", source.columns(schema))
+    scan = Scan(f"{schema.predicate}.{'true' if truth else 'false'}{source.excluded}", source.columns(schema))
     return _Filter(frozenset(variables_of(schema.arguments)), lambda plan: AntiJoin(plan, scan))
 
 

@@ -52,7 +52,7 @@ def condition(network: Network, known: Int8) -> Network:
     variable, value, cardinality, is_block = _variables(network, left, known)
     return replace(
         network,
-        evidence=_with_facts(network, known),
+        evidence=with_facts(network, known),
         atoms=network.atoms[left],
         variable=variable,
         value=value,
@@ -123,7 +123,7 @@ def _variables(network: Network, left: Bool, known: Int8) -> tuple[Int32, Int32,
     return variable, value.astype(np.int32), cardinality[kept].astype(np.int32), network.block[kept]
 
 
-def _with_facts(network: Network, known: Int8) -> Evidence:
+def with_facts(network: Network, known: Int8) -> Evidence:
     """The evidence with the atoms that have become known."""
     evidence, index = network.evidence, np.flatnonzero(known != UNKNOWN)
     facts = dict(evidence.facts)

@@ -16,7 +16,7 @@ from mlnlite.engines.choose import engine_for
 from mlnlite.engines.plan import Engine, Relation
 from mlnlite.ground.assemble import Piece
 from mlnlite.ground.compile import Source, bindings, with_number
-from mlnlite.ground.condition import condition
+from mlnlite.ground.condition import UNKNOWN, with_facts
 from mlnlite.ground.ground import row_tables, source_of
 from mlnlite.ground.network import Network
 from mlnlite.ground.residual import ClauseShape
@@ -27,6 +27,8 @@ from mlnlite.model.formulas import AtomRef
 from mlnlite.model.propositional import cubes
 
 Int64 = NDArray[np.int64]
+
+_CERTAIN = ".certain"
 
 
 def without_templates(network: Network, templates: Iterable[int]) -> Network:
@@ -51,12 +53,19 @@ def without_templates(network: Network, templates: Iterable[int]) -> Network:
 
 
 def world_evidence(network: Network, truth: NDArray[np.bool_]) -> Evidence:
-    """A world of the network's atoms as evidence, everything else false."""
-    return closed(condition(network, truth.astype(np.int8)).evidence, network.evidence.predicates)
+    """The true atoms of a world as evidence, everything else false."""
+    known = np.where(truth, 1, UNKNOWN).astype(np.int8)
+    return closed(with_facts(network, known), network.evidence.predicates)
 
 
 def violations(
-    network: Network, world: Evidence, template: int, *, engine: Engine | None = None, most: int | None = None
+    network: Network,
+    world: Evidence,
+    template: int,
+    *,
+    certain: Evidence | None = None,
+    engine: Engine | None = None,
+    most: int | None = None,
 ) -> list[Piece]:
     """The groundings of a template that a world makes false, as clauses of atom numbers.
 
@@ -64,6 +73,8 @@ def violations(
         network: whose model has the template.
         world: complete, as `world_evidence` gives it.
         template: its index in `model.templates`.
+        certain: for a world in which some atoms are only partly true: what is wholly true. `world` then holds what
+            may be true, and a grounding counts as violated if it may be.
         engine: what runs the query.
         most: no more than so many of each kind of clause.
 
@@ -72,6 +83,9 @@ def violations(
     """
     tables = {**tables_of(world), **row_tables(network.model)}
     source = source_of(template, network.model.templates[template], world)
+    if certain is not None:
+        source = replace(source, excluded=_CERTAIN)
+        tables |= {f"{name}{_CERTAIN}": columns for name, columns in tables_of(certain).items()}
     run = (engine or engine_for(tables)).load(tables)
     pieces = []
     for cube in cubes(source.formula.body, False):

@@ -31,8 +31,8 @@ from mlnlite.model.unparse import row_text
 from mlnlite.results import MapState, Marginals, Statistics, Violation
 
 if TYPE_CHECKING:
-    from mlnlite.infer.cuttingplanes import Lazy
     from mlnlite.infer.rungs import Method
+    from mlnlite.infer.waiting import Lazy
 
 Int64 = NDArray[np.int64]
 
@@ -292,7 +292,7 @@ def _ask(
     evidence = _closed(evidence, closed_world, frozenset() if question is None else question.predicates)
     atoms, lazy = None if question is None else question.all_atoms, None
     if waits:
-        from mlnlite.infer.cuttingplanes import without_lazy, worth_waiting
+        from mlnlite.infer.waiting import without_lazy, worth_waiting
 
         waiting = worth_waiting(model, evidence)
         lazy = without_lazy(model, evidence, waiting, atoms, engine) if waiting else None

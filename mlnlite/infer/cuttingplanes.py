@@ -1,97 +1,31 @@
-"""Best worlds by cutting planes: comes in a model with formulas too many to ground, goes out a world with a bound.
+"""Best worlds by cutting planes: comes in a network that lacks groundings, goes out a world of the whole with a bound.
 
-Solve without these formulas, ask the engine which of their groundings the world violates, add these, solve again. What
-was never generated is never violated, so the last world is best for the whole model. (Riedel, Improving the accuracy
-and efficiency of MAP inference for Markov logic, UAI 2008.)
+Solve without these formulas, ask the engine which of their groundings the solution violates, add these, solve again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import prod
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from mlnlite.engines.plan import Engine
-from mlnlite.ground.assemble import Piece, atom_range
-from mlnlite.ground.ground import forecasts, ground, prepared
-from mlnlite.ground.lazy import violations, world_evidence
-from mlnlite.ground.merge import merged_clauses
-from mlnlite.ground.network import Bool, Clauses, Int32, Int64, Network
+from mlnlite.ground.network import Bool
+from mlnlite.infer.conflict import contradiction
+from mlnlite.infer.deadline import interruptible
+from mlnlite.infer.lazy_program import grow
 from mlnlite.infer.map import BestWorld, map_of
+from mlnlite.infer.partition import partitioned
+from mlnlite.infer.parts import Part
+from mlnlite.infer.potentials import potentials_of
 from mlnlite.infer.rungs import Options
-from mlnlite.infer.score import costs, log_weight
-from mlnlite.model.evidence import Evidence
-from mlnlite.model.formulas import AtomRef, Equal
-from mlnlite.model.model import Model
-from mlnlite.model.propositional import cubes, without_quantifiers
-from mlnlite.model.templates import Template
+from mlnlite.infer.satisfy import feasible_world
+from mlnlite.infer.score import costs, log_weight, truth_of
+from mlnlite.infer.waiting import Lazy, violated_weight, with_violated
 
-LAZY_FROM = 500_000
-"""Groundings of a formula that are worth waiting for."""
-
+CUTTING_PLANES = "cutting planes"
 _CLOSE = 1e-4
-
-
-@dataclass(frozen=True, slots=True)
-class Lazy:
-    """A network that lacks most groundings of some templates; they count as true until they are generated.
-
-    Attributes:
-        network: what was generated so far.
-        templates: indices in its model of the lazy templates.
-    """
-
-    network: Network
-    templates: tuple[int, ...]
-
-    @property
-    def generated(self) -> int:
-        """Number of groundings of the lazy templates that were generated."""
-        return int(self.network.n_open[np.isin(self.network.template, self.templates)].sum())
-
-    @property
-    def total(self) -> int:
-        """Number of all their groundings."""
-        return int(self.network.n_groundings[np.isin(self.network.template, self.templates)].sum())
-
-
-def worth_waiting(model: Model, evidence: Evidence, least: int = LAZY_FROM) -> tuple[int, ...]:
-    """Templates that are better grounded on demand: clauses, hard or of positive weight, with many groundings.
-
-    Args:
-        model: whose.
-        evidence: one database.
-        least: how many groundings are many.
-    """
-    if not any(_can_wait(t, evidence) and _size(t, evidence) >= least for t in model.templates):
-        return ()
-    expected = forecasts(model, evidence)
-    return tuple(i for i, f in enumerate(expected) if f.rows >= least and _can_wait(model.templates[i], evidence))
-
-
-def _can_wait(template: Template, evidence: Evidence) -> bool:
-    """Whether every grounding is a clause that worlds are better off satisfying, over three unknown atoms or more.
-
-    (Pairs of atoms that exclude each other become counts, which are worth having from the start.)
-    """
-    still_open = [a for a in template.formula.atoms if not evidence.predicates[a.predicate].closed]
-    constants = {name: np.flatnonzero(p.any(axis=0)).tolist() for name, p in evidence.present.items()}
-    if not (template.weights > 0).all() or len(template.formula.free) < 2 or len(still_open) < 3:
-        return False
-    if any(v.bound for v in template.formula.variables):
-        return False
-    body = without_quantifiers(template.formula, constants).body
-    false = cubes(body, False)
-    return len(false) == 1 and all(isinstance(p, AtomRef | Equal) for p in false[0])
-
-
-def _size(template: Template, evidence: Evidence) -> int:
-    """Number of groundings of all rows, known ones included."""
-    free = [v for v in template.formula.free if v not in template.keys]
-    return prod(int(evidence.present[template.formula.variables[v].type].sum()) for v in free)
 
 
 def map_lazily(lazy: Lazy, options: Options, engine: Engine | None = None) -> tuple[Lazy, BestWorld]:
@@ -105,6 +39,8 @@ def map_lazily(lazy: Lazy, options: Options, engine: Engine | None = None) -> tu
     Raises:
         Contradiction: no world satisfies the hard formulas.
     """
+    if options.method in ("auto", "ilp"):
+        return _by_program(lazy, options, engine)
     found: list[tuple[float, BestWorld]] = []
     bound, answer = np.inf, _solved(lazy, options)
     while True:
@@ -126,6 +62,42 @@ def map_lazily(lazy: Lazy, options: Options, engine: Engine | None = None) -> tu
     return more if more.generated > lazy.generated else lazy, replace(
         best, log_weight=value, bound=value + gap, status=status, component_gap=np.array([gap])
     )
+
+
+def _by_program(lazy: Lazy, options: Options, engine: Engine | None) -> tuple[Lazy, BestWorld]:
+    """By a program that grows, from a partition where one is asked for."""
+    start = partitioned(lazy, options.seed)
+    with interruptible(options.deadline):
+        found = grow(lazy, start, options, engine)
+    if found.truth is None:
+        found.truth = _allowed(lazy, engine)
+        found.value = log_weight(lazy.network, found.truth) - violated_weight(lazy, found.truth, engine)
+    lazy = replace(with_violated(lazy, found.truth, engine), in_rows=found.n_groundings)
+    gap = max(0.0, found.gap)
+    n = lazy.network.n_atoms
+    status: Literal["optimal", "feasible"] = "optimal" if gap <= _CLOSE else "feasible"
+    return lazy, BestWorld(
+        found.truth, found.value, found.value + gap, status, np.zeros(n, np.int64), (status,), (CUTTING_PLANES,),
+        np.array([gap]), {CUTTING_PLANES: 1}, 0,
+    )  # fmt: skip
+
+
+def _allowed(lazy: Lazy, engine: Engine | None) -> Bool:
+    """A world that violates nothing hard.
+
+    Raises:
+        Contradiction: there is none.
+    """
+    while True:
+        potentials = potentials_of(lazy.network, max_arity=np.inf)
+        n = len(potentials.cardinality)
+        values = feasible_world(Part(0, np.arange(n), potentials.cardinality, potentials.cells))
+        if values is None or np.isneginf(potentials.constant):
+            raise contradiction(lazy.network)
+        truth = truth_of(lazy.network, values)
+        if np.isfinite(violated_weight(lazy, truth, engine)):
+            return truth
+        lazy = with_violated(lazy, truth, engine)
 
 
 def _solved(lazy: Lazy, options: Options) -> BestWorld:
@@ -151,94 +123,3 @@ def _with_nothing(
     nothing = replace(found[-1][1], truth=np.zeros(lazy.network.n_atoms, np.bool_))
     lazy = with_violated(lazy, nothing.truth, engine)
     return lazy, [*found, (log_weight(lazy.network, nothing.truth), nothing)]
-
-
-def without_lazy(
-    model: Model, evidence: Evidence, waiting: Sequence[int], query: Int64 | None = None, engine: Engine | None = None
-) -> Lazy:
-    """The network of all other templates, with the atoms of the lazy ones.
-
-    Args:
-        model: with all templates.
-        evidence: one database.
-        waiting: indices of the templates that are to wait.
-        query: numbers of further atoms that are to be in the network.
-        engine: what runs the grounding plans.
-    """
-    others = tuple(t for i, t in enumerate(model.templates) if i not in waiting)
-    expanded, completed, _ = prepared(replace(model, templates=tuple(model.templates[i] for i in waiting)), evidence)
-    names = {a.predicate for t in expanded.templates for a in t.formula.atoms}
-    ranges = [np.arange(*atom_range(evidence.predicates[n], completed)) for n in sorted(names)]
-    asked = np.concatenate([*ranges, np.zeros(0, np.int64) if query is None else query])
-    base = ground(replace(model, templates=others), evidence, query=asked, engine=engine)
-    first = len(base.model.templates)
-    weights = np.concatenate([base.weights, *(t.weights for t in expanded.templates)])
-    sizes = [len(t.weights) for t in expanded.templates]
-    total = np.repeat(np.array([_size(t, evidence) for t in expanded.templates], np.int64), sizes)
-    network = replace(
-        base,
-        model=replace(base.model, templates=base.model.templates + expanded.templates),
-        weights=weights,
-        template=np.concatenate([base.template, np.repeat(np.arange(len(sizes), dtype=np.int32) + first, sizes)]),
-        decided_true=np.concatenate([base.decided_true, total]),
-        n_groundings=np.concatenate([base.n_groundings, total]),
-    )
-    return Lazy(network, tuple(range(first, first + len(sizes))))
-
-
-def with_violated(lazy: Lazy, truth: Bool, engine: Engine | None = None) -> Lazy:
-    """The network with the groundings that a world violates; the same object if there are none that it lacks."""
-    world = world_evidence(lazy.network, truth)
-    network = lazy.network
-    for template in lazy.templates:
-        for piece in violations(lazy.network, world, template, engine=engine):
-            network = _with_piece(network, template, piece)
-    return lazy if network is lazy.network else replace(lazy, network=network)
-
-
-def _with_piece(network: Network, template: int, piece: Piece) -> Network:
-    """Adds clauses of one shape; literals over known atoms, which are false, are left out."""
-    weight = (piece.row + int(np.searchsorted(network.template, template))).astype(np.int32)
-    numbers = np.stack(piece.atoms, axis=1)
-    index = np.minimum(np.searchsorted(network.atoms, numbers), max(network.n_atoms - 1, 0))
-    is_open = network.atoms[index] == numbers
-    signs = np.where(np.array(piece.shape.signs), 1, -1)  # type: ignore[union-attr]
-    literals = ((index + 1) * signs).astype(np.int32)
-    n_open = is_open.sum(axis=1)
-    for k in np.unique(n_open[n_open > 0]).tolist():
-        rows = np.flatnonzero(n_open == k)
-        columns = np.argsort(~is_open[rows], axis=1, kind="stable")[:, :k]
-        chosen = np.take_along_axis(literals[rows], columns, 1)
-        network = _with_clauses(network, _simple(chosen), weight[rows], piece.count[rows])
-    return network
-
-
-def _simple(literals: Int32) -> Int32:
-    """The literals, each row sorted by atom."""
-    return np.take_along_axis(literals, np.argsort(np.abs(literals), axis=1, kind="stable"), axis=1)
-
-
-def _with_clauses(network: Network, literals: Int32, weight: Int32, count: Int64) -> Network:
-    """Adds the clauses that the network lacks."""
-    repeated = np.any(np.abs(literals[:, 1:]) == np.abs(literals[:, :-1]), axis=1)
-    for row in np.flatnonzero(repeated).tolist():
-        short = np.unique(literals[row : row + 1])[None]
-        network = _with_clauses(network, _simple(short), weight[row : row + 1], count[row : row + 1])
-    literals, weight, count = literals[~repeated], weight[~repeated], count[~repeated]
-    rows, weight, count = merged_clauses(list(literals.T), weight, count)
-    k = rows.shape[1]
-    same = [c for c in network.clauses if c.literals.shape[1] == k and not c.negated]
-    known = {(w, *r) for c in same for r, w in zip(c.literals.tolist(), c.weight.tolist(), strict=True)}
-    fresh = [i for i, (r, w) in enumerate(zip(rows.tolist(), weight.tolist(), strict=True)) if (w, *r) not in known]
-    if not fresh:
-        return network
-    blocks = [*same, Clauses(rows[fresh], weight[fresh], count[fresh])]
-    joined = Clauses(
-        np.concatenate([b.literals for b in blocks]),
-        np.concatenate([b.weight for b in blocks]),
-        np.concatenate([b.count for b in blocks]),
-    )
-    decided = network.decided_true.copy()
-    np.subtract.at(decided, weight[fresh], count[fresh])
-    others = tuple(c for c in network.clauses if c.literals.shape[1] != k or c.negated)
-    return replace(network, clauses=(*others, joined), decided_true=decided)

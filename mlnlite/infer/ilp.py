@@ -72,6 +72,21 @@ def solve_part(
     """
     part, constant = with_costs(part)
     program, columns = program_of(part)
+    answer, _ = solve_program(program, columns, part, deadline, seed, gap=gap, start=start)
+    return replace(answer, bound=answer.bound + constant)
+
+
+def solve_program(
+    program: Program,
+    columns: Columns,
+    part: Part,
+    deadline: Deadline,
+    seed: int = 0,
+    *,
+    gap: float = 0.0,
+    start: Int64 | None = None,
+) -> tuple[PartAnswer, Float]:
+    """Solves the program of a component, to which rows may have been added; returns the values of all columns too."""
     solver = highspy.Highs()  # type: ignore[no-untyped-call]
     options = {"output_flag": False, "random_seed": seed, "threads": 1, "mip_rel_gap": gap, "mip_abs_gap": _ABSOLUTE}
     for name, setting in options.items():
@@ -83,8 +98,7 @@ def solve_part(
         _start(solver, columns, start)
     stop_with(solver, deadline)
     solver.run()
-    answer = _answer(solver, columns, part)
-    return replace(answer, bound=answer.bound + constant)
+    return _answer(solver, columns, part), np.array(solver.getSolution().col_value)
 
 
 def stop_with(solver: highspy.Highs, deadline: Deadline) -> None:
@@ -139,7 +153,7 @@ def world_of(part: Part, columns: Columns, x: Float) -> Int64:
     return world
 
 
-def _literals(columns: Columns, scope: Int64, value: Int64) -> tuple[Int64, Float, Float]:
+def literals(columns: Columns, scope: Int64, value: Int64) -> tuple[Int64, Float, Float]:
     """Column, sign and constant of literals `variable = value`."""
     binary = columns.binary[scope]
     column = columns.first[scope] + np.where(binary, 0, value)
@@ -175,7 +189,7 @@ def _add_blocks(program: Program, columns: Columns, part: Part) -> None:
 
 def _add_cells(program: Program, columns: Columns, cells: Cells) -> None:
     """Cells of one arity."""
-    column, sign, add = _literals(columns, cells.scope.astype(np.int64), cells.value.astype(np.int64))
+    column, sign, add = literals(columns, cells.scope.astype(np.int64), cells.value.astype(np.int64))
     room = column.shape[1] - 1 - add.sum(axis=1)
     hard, pays = np.isneginf(cells.amount), cells.amount > 0
     _add_rows(program, column[hard], sign[hard], room[hard])
@@ -206,7 +220,7 @@ def _without_cliques(program: Program, columns: Columns, cells: Cells) -> Iterat
         rows = np.flatnonzero(cells.amount == amount)
         for members, nodes in _cliques(ends[rows]):
             left[rows[members]] = False
-            _add_count(program, _literals(columns, nodes // wide, nodes % wide), amount)
+            _add_count(program, literals(columns, nodes // wide, nodes % wide), amount)
     yield Cells(cells.scope[left], cells.value[left], cells.amount[left])
 
 

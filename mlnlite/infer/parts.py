@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -16,6 +16,7 @@ from mlnlite.infer.potentials import Potentials
 
 SMALL = 1024
 _BATCH = 1 << 20
+_DECIMALS, _LARGEST, _EXACT = 4, 2.0**40, 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,3 +204,16 @@ def value_of(part: Part, world: Int64) -> float:
         world: shape (n,), a value for each variable.
     """
     return float(sum(c.amount[(world[c.scope] == c.value).all(axis=1)].sum() for c in part.cells))
+
+
+def grain_of(amounts: Sequence[Float]) -> float:
+    """The log-weights of two worlds differ by a multiple of this; 0 if nothing of the kind is known.
+
+    Args:
+        amounts: all that worlds may gain or lose.
+    """
+    finite = np.concatenate([np.zeros(0), *amounts])
+    scaled = finite[np.isfinite(finite)] * 10.0**_DECIMALS
+    if np.abs(scaled).max(initial=0.0) > _LARGEST or np.abs(scaled - np.rint(scaled)).max(initial=0.0) > _EXACT:
+        return 0.0
+    return float(np.gcd.reduce(np.rint(scaled).astype(np.int64))) / 10.0**_DECIMALS

@@ -40,7 +40,7 @@ def solve_part(part: Part, deadline: Deadline = FOREVER, solver_name: str = "pdl
     solver.run()
     found = solver.getSolution()
     multipliers = np.array(found.row_dual) if found.dual_valid else np.zeros(program.n_rows)
-    bound = bound_of(part, program, multipliers)
+    bound, _ = bound_of(part, program, multipliers)
     world = world_of(part, columns, np.array(found.col_value)[: columns.n]) if found.value_valid else None
     value = -np.inf if world is None else value_of(part, world)
     if not np.isfinite(value):
@@ -48,10 +48,13 @@ def solve_part(part: Part, deadline: Deadline = FOREVER, solver_name: str = "pdl
     return PartAnswer(world, bound, bound - value <= _CLOSE * max(1.0, abs(value)), RELAXATION)
 
 
-def bound_of(part: Part, program: Program, multipliers: Float) -> float:
+def bound_of(part: Part, program: Program, multipliers: Float) -> tuple[float, Float]:
     """What no world of a component can pass, by any multipliers of the rows `A x <= b` (those above 0 count as 0).
 
     `min c x >= y b + min (c - A' y) x` for `y <= 0`, and the last part is taken column by column within its limits.
+
+    Returns:
+        The bound, and for each column what to add to it (0 or less) for worlds in which that column is 1.
     """
     model = model_of(program, 0)
     shape = program.n_rows, program.n_columns
@@ -61,4 +64,4 @@ def bound_of(part: Part, program: Program, multipliers: Float) -> float:
     reduced = np.array(model.col_cost_) - matrix.T @ y
     columns = np.minimum(0.0, reduced) * np.array(model.col_upper_)
     least = float(y @ np.array(model.row_upper_) + columns.sum() + model.offset_)
-    return all_gains(part) - least
+    return all_gains(part) - least, -np.maximum(0.0, reduced)

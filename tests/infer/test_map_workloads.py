@@ -9,10 +9,11 @@ import mlnlite as ml
 from benchmarks import generators
 from mlnlite.engines.numpy import NumpyEngine
 from mlnlite.ground.lazy import world_evidence
-from mlnlite.infer.cuttingplanes import map_lazily, with_violated, without_lazy, worth_waiting
+from mlnlite.infer.cuttingplanes import map_lazily
 from mlnlite.infer.map import map_of
 from mlnlite.infer.rungs import Options
 from mlnlite.infer.score import costs
+from mlnlite.infer.waiting import with_violated, without_lazy, worth_waiting
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "mln"
 
@@ -70,10 +71,11 @@ def test_attractive_networks_are_cut():
     assert cost_anew(model, network, by_cut.truth) == pytest.approx(costs(network, by_cut.truth)[0].sum())
 
 
+@pytest.mark.parametrize("method", ["auto", "wcsp"])
 @pytest.mark.parametrize("hard", [True, False])
-def test_cutting_planes_find_what_the_whole_network_has(hard):
+def test_cutting_planes_find_what_the_whole_network_has(hard, method):
     model, evidence = generators.entities(12, 0.1, hard=hard)
-    lazy, best = map_lazily(without_lazy(model, evidence, [3]), Options())
+    lazy, best = map_lazily(without_lazy(model, evidence, [3]), Options(method))
     whole = map_of(ml.ground(model, evidence))
     assert best.log_weight == pytest.approx(whole.log_weight, abs=1e-5)
     assert best.status == whole.status == "optimal"
