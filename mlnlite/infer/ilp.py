@@ -20,6 +20,7 @@ from mlnlite.ground.network import Bool, Float, Int64
 from mlnlite.infer.conjunctions import Cells
 from mlnlite.infer.costs import with_costs
 from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.dominance import merged
 from mlnlite.infer.parts import Part, PartAnswer, all_gains
 
 ILP = "ilp"
@@ -119,7 +120,7 @@ def program_of(part: Part) -> tuple[Program, Columns]:
     columns = Columns(np.cumsum(width) - width, binary, int(width.sum()))
     program = Program([np.zeros(columns.n)], [np.ones(columns.n)], columns.n, offset=all_gains(part))
     _add_blocks(program, columns, part)
-    for cells in part.cells:
+    for cells in map(merged, part.cells):
         for rest in _without_cliques(program, columns, cells):
             _add_cells(program, columns, rest)
     return program, columns
