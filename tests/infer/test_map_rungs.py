@@ -137,7 +137,7 @@ def test_linear_bounds_hold_with_any_multipliers(net, solver, seed):
 
 def test_pairs_that_stand_several_times_are_not_all_pairs():
     pairs = [(0, 0), (0, 0), (0, 0), (0, 1), (0, 1), (1, 0)]
-    cost = Cells(np.zeros((6, 2), np.int32) + [0, 1], np.array(pairs, np.int32), np.full(6, -1.74))
+    cost = Cells(np.tile(np.arange(2, dtype=np.int32), (6, 1)), np.array(pairs, np.int32), np.full(6, -1.74))
     gain = Cells(np.zeros((1, 1), np.int32), np.ones((1, 1), np.int32), np.array([3.9]))
     other = Cells(np.ones((1, 1), np.int32), np.ones((1, 1), np.int32), np.array([1.74]))
     part = Part(0, np.arange(2), np.array([3, 3]), (gain, other, cost))
