@@ -57,7 +57,6 @@ if TYPE_CHECKING:
     from mlnlite.model.facts import closed as closed
     from mlnlite.model.facts import no_evidence as no_evidence
     from mlnlite.model.model import Model as Model
-    from mlnlite.model.read import evidence_from_tables as evidence_from_tables
     from mlnlite.model.read import evidence_from_text as evidence_from_text
     from mlnlite.model.read import model_from_text as model_from_text
     from mlnlite.model.read import one_database as one_database
@@ -102,7 +101,6 @@ _HOMES = {
     "closed": "mlnlite.model.facts",
     "no_evidence": "mlnlite.model.facts",
     "Model": "mlnlite.model.model",
-    "evidence_from_tables": "mlnlite.model.read",
     "evidence_from_text": "mlnlite.model.read",
     "model_from_text": "mlnlite.model.read",
     "one_database": "mlnlite.model.read",

@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic
 from mlnlite.model.symbols import Predicate, Type
+
+if TYPE_CHECKING:
+    from mlnlite.model.model import Model
 
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
@@ -77,6 +81,30 @@ class Evidence:
     warnings: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
     soft: Mapping[str, SoftFacts] = field(default_factory=dict)
     cuts: Mapping[tuple[str, int], tuple[float, ...]] = field(default_factory=dict)
+
+    @staticmethod
+    def from_tables(tables: Mapping[str, Any], *, model: Model) -> Evidence:
+        """Evidence about one world from tables.
+
+        Args:
+            tables: for each predicate a `Table`, or what can be its `source`: a file, a data frame (pandas, Polars,
+                Arrow), a mapping from names to columns.
+            model: what the facts are about.
+
+        Raises:
+            EvidenceMistake: if a table cannot be read or does not fit the model, or facts contradict each other.
+
+        >>> from mlnlite.model.read import model_from_text
+        >>> model = model_from_text("Friends(person, person)")
+        >>> evidence = Evidence.from_tables({"Friends": {"from": ["Anna"], "to": ["Bob"]}}, model=model)
+        >>> evidence.types["person"].constants
+        ('Anna', 'Bob')
+        """
+        from mlnlite.model.read import evidence_of
+        from mlnlite.model.table import Table
+
+        given = [(name, t if isinstance(t, Table) else Table(t)) for name, t in tables.items()]
+        return evidence_of([], model, together=True, tables=given)
 
     def sizes(self, predicate: str) -> tuple[int, ...]:
         """Number of constants of each argument of a predicate."""

@@ -57,18 +57,20 @@ class _Reading:
 
 @dataclass(frozen=True, slots=True)
 class TableFacts:
-    """A table as a program of evidence: one database; for each argument its cut points, if it was divided into bins."""
+    """A table as a program of evidence: one database.
 
-    table: FactTable
+    Attributes:
+        facts: what its rows say about a predicate; what is certain and what is not stand apart.
+        constants: for each argument those of all rows, rows that say nothing included.
+        cuts: for each argument its cut points, if it was divided into bins.
+    """
+
+    facts: tuple[FactTable, ...]
+    constants: tuple[Sequence[str], ...]
     cuts: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
 
     types: ClassVar[tuple[()]] = ()
     n_databases: ClassVar[int] = 1
-
-    @property
-    def facts(self) -> tuple[FactTable]:
-        """As a program has them."""
-        return (self.table,)
 
 
 def check_evidence(
@@ -119,7 +121,7 @@ def check_evidence(
 def _name(program: EvidenceProgram | TableFacts) -> str:
     """The file of a program."""
     if isinstance(program, TableFacts):
-        return program.table.source.name
+        return program.facts[0].source.name
     return program.span.source.name if program.span else "<no evidence>"
 
 
@@ -214,10 +216,9 @@ def _read_table(table: FactTable, first: int, reading: _Reading) -> None:
 
 def _mention(program: TableFacts, first: int, reading: _Reading) -> None:
     """Notes the constants of all rows of a table, those that say nothing included, and cut points."""
-    predicate = reading.predicates[program.table.predicate]
-    for type_name, column in zip(predicate.types, program.table.columns, strict=True):
-        ids = reading.ids(type_name, column.names)
-        reading.declared.append((first, first + 1, type_name, ids.tolist()))
+    predicate = reading.predicates[program.facts[0].predicate]
+    for type_name, names in zip(predicate.types, program.constants, strict=True):
+        reading.declared.append((first, first + 1, type_name, reading.ids(type_name, names).tolist()))
     reading.cuts.update({(predicate.name, i): points for i, points in program.cuts.items()})
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path as FilePath
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -96,38 +96,18 @@ def read_evidence(*paths: Path, model: Model, together: bool = False) -> Evidenc
             tables += read_mapping(FilePath(path))
         else:
             texts.append(read_source(path))
-    return _evidence(texts, model, together=together, tables=tables)
-
-
-def evidence_from_tables(tables: Mapping[str, Any], *, model: Model) -> Evidence:
-    """Evidence about one world from tables.
-
-    Args:
-        tables: for each predicate a `Table`, or what can be its `source`: a file, a data frame (pandas, Polars, Arrow),
-            a mapping from names to columns.
-        model: what the facts are about.
-
-    Raises:
-        EvidenceMistake: if a table cannot be read or does not fit the model, or facts contradict each other.
-
-    >>> from mlnlite.model.read import model_from_text
-    >>> model = model_from_text("Friends(person, person)")
-    >>> evidence = evidence_from_tables({"Friends": {"from": ["Anna"], "to": ["Bob"]}}, model=model)
-    >>> evidence.types["person"].constants
-    ('Anna', 'Bob')
-    """
-    given = [(name, t if isinstance(t, Table) else Table(t)) for name, t in tables.items()]
-    return _evidence([], model, together=True, tables=given)
+    return evidence_of(texts, model, together=together, tables=tables)
 
 
 def evidence_from_text(text: str, *, model: Model) -> Evidence:
     """The evidence that a text means. Raises as `read_evidence`."""
-    return _evidence([Source("<text>", text)], model, together=False)
+    return evidence_of([Source("<text>", text)], model, together=False)
 
 
-def _evidence(
+def evidence_of(
     texts: Sequence[Source], model: Model, *, together: bool, tables: Sequence[tuple[str, Table]] = ()
 ) -> Evidence:
+    """Evidence from texts and tables; see `read_evidence`."""
     programs: list[EvidenceProgram | TableFacts] = [parse_evidence(source) for source in texts]
     warnings: list[Diagnostic] = []
     for name, table in tables:

@@ -86,13 +86,13 @@ def _open_database(connection: duckdb.DuckDBPyConnection, path: str, table: str)
         connection.execute(f"CREATE VIEW source AS SELECT * FROM attached.{_name(table)}")
         return
     with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as database:
-        rows = database.execute(f"SELECT * FROM {_name(table)}")
-        names = [column[0] for column in rows.description]
+        names = [column[0] for column in database.execute(f"SELECT * FROM {_name(table)} LIMIT 0").description]
+        texts = ", ".join(f"CAST({_name(n)} AS TEXT)" for n in names)
+        rows = database.execute(f"SELECT {texts} FROM {_name(table)}")
         connection.execute(f"CREATE TABLE source ({', '.join(f'{_name(n)} VARCHAR' for n in names)})")
         while chunk := rows.fetchmany(ROWS_AT_ONCE):
             columns = {str(i): np.array(c, object) for i, c in enumerate(zip(*chunk, strict=True))}
-            texts = {k: np.array([None if v is None else str(v) for v in c], object) for k, c in columns.items()}
-            connection.register("chunk", texts)
+            connection.register("chunk", columns)
             connection.execute("INSERT INTO source SELECT * FROM chunk")
 
 
@@ -118,15 +118,25 @@ def _read(
     parts += [f"{_name(c)} AS {role}" for role, c in special.items() if c]
     connection.execute(f"CREATE TEMP TABLE t AS SELECT {', '.join(_aliased(parts, len(arguments)))} FROM source")
     columns = tuple(_coded(connection, i) for i in range(len(arguments)))
-    says, truth, soft = _truth(connection, special, name)
-    for column in columns:
-        says &= column.codes >= 0
-    rows = np.flatnonzero(says)
-    kept = tuple(Coded(c.names, c.codes[rows]) for c in columns)
-    database, softness = np.zeros(len(rows), np.int32), None if soft is None else soft[rows]
+    truth, weight = _truth(connection, special, name)
+    rows = np.flatnonzero(np.all([column.codes >= 0 for column in columns], axis=0) if columns else truth == truth)
     source = RowSource(name, "", columns, predicate.name)
-    facts = FactTable(predicate.name, kept, truth[rows], database, softness, rows, source)
-    return TableFacts(facts, cuts), list(_warnings(columns, arguments, len(says), rows, name))
+    unsure = np.isfinite(weight[rows])
+    facts = [
+        FactTable(
+            predicate.name,
+            tuple(Coded(c.names, c.codes[mine]) for c in columns),
+            truth[mine] != 0,
+            np.zeros(len(mine), np.int32),
+            weight[mine] if soft else None,
+            mine,
+            source,
+        )
+        for mine, soft in ((rows[~unsure], False), (rows[unsure], True))
+        if len(mine) or not soft
+    ]
+    warnings = list(_warnings(columns, arguments, len(truth), rows, name))
+    return TableFacts(tuple(facts), tuple(c.names for c in columns), cuts), warnings
 
 
 def _special(role: str, table: Table, names: Sequence[str], where: str) -> str | None:
@@ -184,20 +194,22 @@ def _coded(connection: duckdb.DuckDBPyConnection, index: int) -> Coded:
 
 def _truth(
     connection: duckdb.DuckDBPyConnection, special: dict[str, str | None], name: str
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64] | None]:
-    """Which rows say something, whether their fact is true, and the log-odds of soft rows."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """For each row whether its fact is true (1 or 0), and its log-odds if it is not certain, else nan.
+
+    An empty cell leaves the fact open, which is a log-odds of 0.
+    """
     n_rows = connection.execute("SELECT count(*) FROM t").fetchall()[0][0]
-    says, truth = np.ones(n_rows, np.bool_), np.ones(n_rows, np.bool_)
+    truth, weight = np.ones(n_rows), np.full(n_rows, np.nan)
     if special["truth"]:
-        values = _numbers(connection, "CAST(CAST(truth AS BOOLEAN) AS DOUBLE)", name)
-        says, truth = ~np.isnan(values), values == 1
+        truth = _numbers(connection, "CAST(CAST(truth AS BOOLEAN) AS DOUBLE)", name)
+        weight[np.isnan(truth)] = 0
     if special["probability"]:
-        values = _numbers(connection, "CAST(probability AS DOUBLE)", name)
-        return says & ~np.isnan(values), truth, _log_odds(values, name)
-    if special["weight"]:
-        values = _numbers(connection, "CAST(weight AS DOUBLE)", name)
-        return says & ~np.isnan(values), truth, values
-    return says, truth, None
+        weight = _log_odds(_numbers(connection, "CAST(probability AS DOUBLE)", name), name)
+    elif special["weight"]:
+        weight = _numbers(connection, "CAST(weight AS DOUBLE)", name)
+        _verify(np.isinf(weight), weight, "weight", name)
+    return truth, weight if not (special["probability"] or special["weight"]) else np.where(np.isnan(weight), 0, weight)
 
 
 def _numbers(connection: duckdb.DuckDBPyConnection, expression: str, name: str) -> NDArray[np.float64]:
@@ -211,12 +223,15 @@ def _numbers(connection: duckdb.DuckDBPyConnection, expression: str, name: str) 
 
 
 def _log_odds(values: NDArray[np.float64], name: str) -> NDArray[np.float64]:
-    wrong = np.flatnonzero((values <= 0) | (values >= 1))
-    if len(wrong):
-        message = f"row {wrong[0] + 1} of {name} has the probability {values[wrong[0]]:g}"
-        hint = "soft evidence lies between 0 and 1; say what is certain in a column `truth`"
-        raise EvidenceMistake([Diagnostic("E336", message, hint=hint)])
+    _verify((values <= 0) | (values >= 1), values, "probability", name)
     return np.asarray(np.log(values) - np.log1p(-values))
+
+
+def _verify(wrong: NDArray[np.bool_], values: NDArray[np.float64], what: str, name: str) -> None:
+    for row in np.flatnonzero(wrong)[:1].tolist():
+        message = f"row {row + 1} of {name} has the {what} {values[row]:g}"
+        hint = "soft evidence lies between certainties; say what is certain in a column `truth`"
+        raise EvidenceMistake([Diagnostic("E336", message, hint=hint)])
 
 
 def _warnings(
@@ -227,6 +242,6 @@ def _warnings(
             message = f"the first line of {where} was taken as its header, and {name} stands below, too"
             yield Diagnostic("W311", message, hint="a table starts with the names of its columns", severity="warning")
     if len(rows) < n_rows:
-        message = f"{n_rows - len(rows):,} of {n_rows:,} rows of {where} have no value somewhere and say nothing"
+        message = f"{n_rows - len(rows):,} of {n_rows:,} rows of {where} lack a constant and say nothing"
         hint = "an atom without a fact is unknown, unless its predicate is closed"
         yield Diagnostic("W312", message, hint=hint, severity="warning")

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
+from contextlib import closing
 
 import duckdb
 import numpy as np
 import pandas as pd
+import polars as pl
+import pyarrow as pa
 import pytest
 
 import mlnlite as ml
@@ -47,25 +50,43 @@ def files(frame, folder):
 @pytest.mark.parametrize("name", ["f.csv", "f.tsv", "f.jsonl", "f.parquet", "f.duckdb::t", "f.sqlite::t"])
 def test_files(model, frame, tmp_path, name):
     files(frame, tmp_path)
-    evidence = ml.evidence_from_tables({"Friends": f"{tmp_path}/{name}"}, model=model)
+    evidence = ml.Evidence.from_tables({"Friends": f"{tmp_path}/{name}"}, model=model)
     assert facts(evidence) == dict.fromkeys(ROWS, True)
     again = ml.read_evidence(f"Friends={tmp_path}/{name}", model=model)
     assert facts(again) == facts(evidence)
 
 
 def test_frames_and_columns(model, frame):
-    for source in (frame, {"from": frame["from"].to_numpy(), "to": frame["to"].to_numpy()}, frame.to_dict("list")):
-        assert facts(ml.evidence_from_tables({"Friends": source}, model=model)) == dict.fromkeys(ROWS, True)
+    columns = frame.to_dict("list")
+    arrays = {"from": frame["from"].to_numpy(), "to": frame["to"].to_numpy()}
+    polars = pl.DataFrame(columns)
+    arrow = pa.table(columns)
+    for source in (
+        frame,
+        columns,
+        arrays,
+        polars,
+        polars.lazy(),
+        arrow,
+        arrow.to_batches()[0],
+        frame.astype("category"),
+    ):
+        assert facts(ml.Evidence.from_tables({"Friends": source}, model=model)) == dict.fromkeys(ROWS, True)
 
 
-def test_truth_and_null(model):
+@pytest.mark.parametrize("kind", [pd.DataFrame, pl.DataFrame, pa.table])
+def test_truth_and_null(model, kind):
     source = {
         "from": ["Anna", "Bob", "Cid", None],
         "to": ["Bob", "Cid", "Dan", "Eve"],
         "truth": [True, False, None, True],
     }
-    evidence = ml.evidence_from_tables({"Friends": pd.DataFrame(source)}, model=model)
+    evidence = ml.Evidence.from_tables({"Friends": kind(source)}, model=model)
     assert facts(evidence) == {("Anna", "Bob"): True, ("Bob", "Cid"): False}
+    as_text = ml.evidence_from_text("?Friends(Cid, Dan)", model=model).soft["Friends"]
+    (row,) = evidence.soft["Friends"].arguments
+    assert [evidence.types["person"].constants[i] for i in row] == ["Cid", "Dan"]
+    assert evidence.soft["Friends"].weight == as_text.weight == 0
     assert set(evidence.types["person"].constants) == {"Anna", "Bob", "Cid", "Dan", "Eve"}
     assert evidence.present["person"].all()
     assert [w.code for w in evidence.warnings] == ["W312"]
@@ -73,30 +94,39 @@ def test_truth_and_null(model):
 
 def test_numbers(model):
     table = pd.DataFrame({"person": ["Anna", "Bob"], "years": [30.0, 41.5]})
-    evidence = ml.evidence_from_tables({"Age": table}, model=model)
+    evidence = ml.Evidence.from_tables({"Age": table}, model=model)
     assert facts(evidence, "Age") == {("Anna", "30"): True, ("Bob", "41.5"): True}
 
 
 def test_bins(model):
     table = pd.DataFrame({"person": list("ABCD"), "years": [3, 18, 64.5, 65]})
-    evidence = ml.evidence_from_tables({"Age": ml.Table(table, bins={"years": [18, 65]})}, model=model)
+    evidence = ml.Evidence.from_tables({"Age": ml.Table(table, bins={"years": [18, 65]})}, model=model)
     bins = {"A": "<18", "B": "18..65", "C": "18..65", "D": ">=65"}
     assert facts(evidence, "Age") == {(p, b): True for p, b in bins.items()}
     assert evidence.cuts == {("Age", 1): (18.0, 65.0)}
-    even = ml.evidence_from_tables({"Age": ml.Table(table, bins={"years": 2})}, model=model)
+    even = ml.Evidence.from_tables({"Age": ml.Table(table, bins={"years": 2})}, model=model)
     counts = np.unique(even.facts["Age"].arguments[:, 1], return_counts=True)[1]
     assert sorted(counts.tolist()) in ([2, 2], [1, 3])
 
 
 def test_probabilities_are_soft_evidence(model):
     table = {"person": ["Anna", "Bob"], "probability": [0.7, 0.2]}
-    evidence = ml.evidence_from_tables({"Smokes": table}, model=model)
+    evidence = ml.Evidence.from_tables({"Smokes": table}, model=model)
     as_text = ml.evidence_from_text("0.7 Smokes(Anna)\n0.2 Smokes(Bob)", model=model)
     for e in (evidence, as_text):
         answer = ml.marginal(model, e, ["Smokes"])
         assert answer["Smokes(Anna)"] == pytest.approx(ml.marginal(model, as_text)["Smokes(Anna)"], abs=1e-12)
-    weights = ml.evidence_from_tables({"Smokes": {"person": ["Anna"], "weight": [1.5]}}, model=model)
+    weights = ml.Evidence.from_tables({"Smokes": {"person": ["Anna"], "weight": [1.5]}}, model=model)
     assert weights.soft["Smokes"].weight.tolist() == [1.5]
+
+
+def test_sqlite_as_text(model, tmp_path):
+    with closing(sqlite3.connect(tmp_path / "f.sqlite")) as database:
+        database.execute("CREATE TABLE ages (person, years)")
+        database.executemany("INSERT INTO ages VALUES (?, ?)", [("Anna", 30), ("Bob", 41.5), ("Cid", None)])
+        database.commit()
+    evidence = ml.Evidence.from_tables({"Age": f"{tmp_path}/f.sqlite::ages"}, model=model)
+    assert facts(evidence, "Age") == {("Anna", "30"): True, ("Bob", "41.5"): True}
 
 
 def test_mapping(model, frame, tmp_path):
@@ -142,7 +172,7 @@ def test_together_with_text(model, frame, tmp_path):
 )
 def test_mistakes(model, predicate, source, code, words):
     with pytest.raises(ml.EvidenceMistake) as caught:
-        ml.evidence_from_tables({predicate: source}, model=model)
+        ml.Evidence.from_tables({predicate: source}, model=model)
     assert caught.value.diagnostics[0].code == code
     assert words in str(caught.value)
 
