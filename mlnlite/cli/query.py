@@ -43,6 +43,8 @@ _METHODS = {
     "gibbs": ("marginal",),
     "mcsat": ("marginal",),
     "tempering": ("marginal",),
+    "wmc": ("marginal",),
+    "bp": ("marginal",),
     "ve": ("map",),
     "wcsp": ("map",),
     "mincut": ("map",),

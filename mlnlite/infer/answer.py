@@ -62,11 +62,12 @@ def marginal(  # noqa: PLR0913
             formula leaves open.
         closed_world: predicates of which everything that is not a fact is false; "all" for all that the query does
             not mention (but functional predicates `!` without a known value stay open).
-        method: "auto" (exact where it fits, else sampled), "exact" (or refuse), "lifted", or "gibbs", "mcsat" or
-            "tempering" for everything.
+        method: "auto" (exact where it fits, else sampled), "exact" (or refuse), "lifted", "wmc" (model counting, exact,
+            needs the extra `wmc`), "gibbs", "mcsat" or "tempering" for everything, or "bp" (approximate).
         width_limit: largest number of entries of a table in exact inference.
         precision: largest standard error of what is sampled; sampling stops when it is reached.
-        time_limit: [s] for sampling, 60 by default; the result then says what is not as precise as asked.
+        time_limit: [s] for sampling, 60 by default; the result then says what is not as precise as asked. Also for
+            "wmc", for ever by default.
         chains: how many are sampled, at least 2.
         seed: where the chance of sampling starts.
         engine: what runs the grounding plans; by default chosen by size.

@@ -8,7 +8,7 @@ from typing import Literal
 from mlnlite.infer.marginal import WIDTH_LIMIT
 
 Sampler = Literal["gibbs", "mcsat", "tempering"]
-MarginalMethod = Literal["auto", "exact", "lifted", "gibbs", "mcsat", "tempering"]
+MarginalMethod = Literal["auto", "exact", "lifted", "wmc", "gibbs", "mcsat", "tempering", "bp"]
 SAMPLERS: dict[MarginalMethod, Sampler] = {"gibbs": "gibbs", "mcsat": "mcsat", "tempering": "tempering"}
 PATIENCE = 60.0
 
@@ -21,7 +21,7 @@ class Approach:
         method: "auto" for the ladder, "exact" to refuse what is too wide, or one method by name.
         width_limit: largest number of entries of a table.
         precision: largest standard error of what is sampled.
-        time_limit: [s] for all sampling; None for 60.
+        time_limit: [s] for all sampling; None for 60. For model counting by name None is for ever.
         chains: how many are sampled.
         seed: where chance starts.
     """

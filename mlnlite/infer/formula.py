@@ -14,7 +14,7 @@ import numpy as np
 from mlnlite.ground.network import Float, Network
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.conjunctions import Conjunctions
-from mlnlite.infer.marginal import WIDTH_LIMIT, Distributions, distributions_of, limit_reached
+from mlnlite.infer.marginal import WIDTH_LIMIT, Distributions, Rung, distributions_of, limit_reached
 from mlnlite.infer.potentials import potentials_of
 from mlnlite.model.formulas import All, Any, AtomRef, Expression, Iff, Not
 
@@ -48,13 +48,16 @@ def formula_probability(network: Network, formula: Expression, *, width_limit: i
     return float(formula_probabilities(network, [formula], width_limit=width_limit)[0])
 
 
-def formula_probabilities(network: Network, formulas: Sequence[Expression], *, width_limit: int = WIDTH_LIMIT) -> Float:
+def formula_probabilities(
+    network: Network, formulas: Sequence[Expression], *, width_limit: int = WIDTH_LIMIT, rung: Rung | None = None
+) -> Float:
     """Probabilities of formulas, all at once where that is not too wide, else in smaller groups.
 
     Args:
         network: what was ground.
         formulas: expressions of `AtomRef`, `Not`, `All`, `Any`, `Iff`; an `AtomRef` is an index into `network.atoms`.
         width_limit: largest number of entries of a table.
+        rung: what to try with components past the limit.
 
     Returns:
         Shape (n_formulas,).
@@ -70,7 +73,7 @@ def formula_probabilities(network: Network, formulas: Sequence[Expression], *, w
     potentials = potentials_of(network, extra, definitions.n_auxiliary, chained=True)
     wanted = np.zeros(len(potentials.cardinality), np.bool_)
     wanted[[x.variable for x in literals if isinstance(x, Literal)]] = True
-    found = distributions_of(potentials, wanted, wanted, width_limit)
+    found = distributions_of(potentials, wanted, wanted, width_limit, rung)
     if np.isneginf(found.constant) or np.isneginf(found.log_z).any():
         raise contradiction(network)
     if found.wide and len(formulas) == 1:
@@ -80,7 +83,7 @@ def formula_probabilities(network: Network, formulas: Sequence[Expression], *, w
     for part in np.array_split(left, 2):
         if len(part):
             asked = [formulas[i] for i in part]
-            probability[part] = formula_probabilities(network, asked, width_limit=width_limit)
+            probability[part] = formula_probabilities(network, asked, width_limit=width_limit, rung=rung)
     return probability
 
 

@@ -10,14 +10,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mlnlite.errors import LimitReached
+from mlnlite.errors import LimitReached, QueryMistake
 from mlnlite.ground.network import Bool, Float, Float32, Int64, Network
 from mlnlite.infer.approach import PATIENCE, SAMPLERS, Approach
 from mlnlite.infer.deadline import in_seconds
 from mlnlite.infer.formula import formula_probabilities
-from mlnlite.infer.marginal import ELIMINATION, AtomProbabilities, marginals_of
+from mlnlite.infer.marginal import ELIMINATION, AtomProbabilities, Rung, marginals_of
 from mlnlite.infer.query import atom_numbers
+from mlnlite.infer.wmc import MODEL_COUNTING, count_models, is_available, is_mostly_hard, verify_available
 from mlnlite.model.formulas import Expression
+
+_SHARE = 6
 
 
 @dataclass(slots=True)
@@ -77,6 +80,8 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
         np.int64
     )
     solution = _nothing_yet(len(atoms) + len(formulas))
+    if formulas and approach.method == "bp":
+        raise QueryMistake("belief propagation answers atoms only", hint="ask for `auto`, or for the atoms")
     if approach.method in SAMPLERS:
         everything = np.ones(network.n_variables, np.bool_)
         _enter_sample(network, solution, everything, (atoms, formulas, np.arange(len(solution.methods))), approach)
@@ -84,7 +89,8 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
     network, found = _exactly(network, None if len(asked) == network.n_atoms else asked, approach)
     solution.log_z, solution.largest_table = found.log_z, found.largest_table
     solution.n_components = found.n_components
-    _enter_exact(solution, np.arange(len(atoms)), found.probability[atoms], [found.method[a] for a in atoms.tolist()])
+    methods = [found.method[a] for a in atoms.tolist()]
+    _enter(solution, np.arange(len(atoms)), found.probability[atoms], found.exact[atoms], methods)
     _formulas_exactly(network, solution, found, (len(atoms), formulas), approach)
     jobs = sorted(_jobs(found, (atoms, formulas), np.flatnonzero(np.isnan(solution.probability))), key=_n_rows)
     deadline = in_seconds(PATIENCE if approach.time_limit is None else approach.time_limit)
@@ -98,17 +104,46 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
 
 def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple[Network, AtomProbabilities]:
     """Elimination; where that is too wide, once more with pairs that are complete as counts."""
-    limit, refuses = approach.width_limit, approach.method == "exact"
+    by_name, limit = _rung_by_name(approach), approach.width_limit
+    if by_name is not None:
+        found = marginals_of(network, asked, width_limit=1, too_wide="leave", rung=by_name)
+        if found.wide:
+            raise LimitReached("the time limit was reached", hint="give it more time, or ask for `auto`")
+        return network, found
     found = marginals_of(network, asked, width_limit=limit, too_wide="leave")
     if found.wide:
         from mlnlite.ground.patterns import with_counts
 
-        counted = with_counts(network)
-        better = len(counted.counts) > len(network.counts)
-        if better or refuses:
-            network = counted if better else network
-            found = marginals_of(network, asked, width_limit=limit, too_wide="raise" if refuses else "leave")
+        refuses = approach.method == "exact"
+        network, rung = with_counts(network), _rung_for_wide(approach)
+        found = marginals_of(network, asked, width_limit=limit, too_wide="raise" if refuses else "leave", rung=rung)
     return network, found
+
+
+def _rung_by_name(approach: Approach) -> Rung | None:
+    """What answers all components that are not listed, if a user named it.
+
+    Raises:
+        MissingPart: it is not installed.
+    """
+    if approach.method == "bp":
+        from mlnlite.infer.bp import propagate_beliefs
+
+        return propagate_beliefs
+    if approach.method != "wmc":
+        return None
+    verify_available()
+    deadline = in_seconds(approach.time_limit)
+    return lambda part, wanted: count_models(part, wanted, deadline)
+
+
+def _rung_for_wide(approach: Approach) -> Rung | None:
+    """Model counting of components that are mostly hard, if that is installed; for a sixth of the time."""
+    limit = PATIENCE if approach.time_limit is None else approach.time_limit
+    deadline = in_seconds(limit / _SHARE)
+    if not is_available():
+        return None
+    return lambda part, wanted: count_models(part, wanted, deadline) if is_mostly_hard(part) else None
 
 
 def _n_rows(job: tuple[Int64, Int64]) -> int:
@@ -123,12 +158,12 @@ def _nothing_yet(n: int) -> Solution:
     return Solution(probability, error, low, high, r_hat, size, no, [""] * n, mixed=np.ones(n, np.bool_))
 
 
-def _enter_exact(solution: Solution, rows: Int64, probability: Float, methods: Sequence[str]) -> None:
-    """Writes down exact answers; nan for those that are not known."""
-    known = ~np.isnan(probability)
-    for column in (solution.probability, solution.low, solution.high):
-        column[rows] = probability
-    solution.error[rows], solution.exact[rows] = np.where(known, 0.0, np.nan), known
+def _enter(solution: Solution, rows: Int64, probability: Float, exact: Bool, methods: Sequence[str]) -> None:
+    """Writes down answers that are not sampled; nan for those that are not known, and for errors of guesses."""
+    solution.probability[rows], solution.exact[rows] = probability, exact
+    solution.error[rows] = np.where(exact, 0.0, np.nan)
+    for column in (solution.low, solution.high):
+        column[rows] = np.where(exact, probability, np.nan)
     for row, method in zip(rows.tolist(), methods, strict=True):
         solution.methods[row] = method
 
@@ -150,15 +185,17 @@ def _formulas_exactly(
     ]
     if not rows:
         return
+    rung = _rung_by_name(approach)
+    limit, method = (approach.width_limit, ELIMINATION) if rung is None else (1, MODEL_COUNTING)
     try:
         probability = formula_probabilities(
-            network, [expressions[r - first] for r in rows], width_limit=approach.width_limit
+            network, [expressions[r - first] for r in rows], width_limit=limit, rung=rung
         )
     except LimitReached:
-        if approach.method == "exact":
+        if approach.method in ("exact", "wmc"):
             raise
         return
-    _enter_exact(solution, np.array(rows, np.int64), probability, [ELIMINATION] * len(rows))
+    _enter(solution, np.array(rows, np.int64), probability, np.ones(len(rows), np.bool_), [method] * len(rows))
 
 
 def _jobs(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -13,8 +13,8 @@ from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.elimination import log_sum
 from mlnlite.infer.fold import fold, unfold
-from mlnlite.infer.order import TooWide, plan
-from mlnlite.infer.parts import Batch, Division, Part, batches, divide, parts
+from mlnlite.infer.order import TooWide, Tree, plan
+from mlnlite.infer.parts import Batch, Division, Part, Summed, batches, divide, parts
 from mlnlite.infer.peel import (
     Gone,
     changed_by,
@@ -28,6 +28,9 @@ from mlnlite.infer.potentials import Potentials, potentials_of
 WIDTH_LIMIT = 1 << 25
 MEMORY_LIMIT = 1 << 27
 CLOSED_FORM, ELIMINATION = "closed form", "elimination"
+
+Rung = Callable[[Part, Bool], Summed | None]
+"""Answers a component that is too wide for elimination, about some of its variables; None if it cannot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +72,7 @@ class Distributions:
         log_z: shape (n_components,), nan where not worked out.
         method: of each component, empty where not worked out.
         constant: log-weight that every world has; minus infinity if no world is possible.
+        guessed: components of which the distributions are not exact.
         wide: components past the limit, with what it would have taken.
         largest_table: number of entries.
     """
@@ -79,6 +83,7 @@ class Distributions:
     log_z: Float
     method: list[str]
     constant: float
+    guessed: list[int] = field(default_factory=list)
     wide: list[tuple[Part, TooWide]] = field(default_factory=list)
     largest_table: int = 0
 
@@ -89,6 +94,7 @@ def marginals_of(
     *,
     width_limit: int = WIDTH_LIMIT,
     too_wide: Literal["raise", "leave"] = "raise",
+    rung: Rung | None = None,
 ) -> AtomProbabilities:
     """Probabilities of atoms by closed form, listing and elimination.
 
@@ -97,6 +103,7 @@ def marginals_of(
         atoms: indices into `network.atoms`; None for all. Components without any of them are not looked at.
         width_limit: largest number of entries of a table.
         too_wide: what to do with components past the limit: raise, or leave their atoms to another method.
+        rung: what to try with them before that.
 
     Raises:
         Contradiction: no world satisfies the hard formulas.
@@ -108,7 +115,7 @@ def marginals_of(
     asked[slice(None) if atoms is None else atoms] = True
     wanted = np.zeros(len(potentials.cardinality), np.bool_)
     wanted[network.variable[asked]] = True
-    found = distributions_of(potentials, wanted, wanted if atoms is not None else None, width_limit)
+    found = distributions_of(potentials, wanted, wanted if atoms is not None else None, width_limit, rung)
     if np.isneginf(found.constant) or np.isneginf(found.log_z).any():
         raise contradiction(network)
     if found.wide and too_wide == "raise":
@@ -118,13 +125,17 @@ def marginals_of(
     method = tuple(found.method[c] if a else "" for c, a in zip(label.tolist(), asked.tolist(), strict=True))
     wide = tuple(part.component for part, _ in found.wide)
     log_z = float(found.log_z.sum() + found.constant)
-    exact = ~np.isnan(probability)
+    exact = ~np.isnan(probability) & ~np.isin(label, found.guessed)
     n_components = len(np.unique(found.label[: network.n_variables]))
     return AtomProbabilities(probability, exact, method, log_z, n_components, found.largest_table, label, wide)
 
 
 def distributions_of(
-    potentials: Potentials, wanted: Bool, needed: Bool | None = None, width_limit: int = WIDTH_LIMIT
+    potentials: Potentials,
+    wanted: Bool,
+    needed: Bool | None = None,
+    width_limit: int = WIDTH_LIMIT,
+    rung: Rung | None = None,
 ) -> Distributions:
     """Distributions of variables and the log partition function of each component.
 
@@ -133,6 +144,7 @@ def distributions_of(
         wanted: shape (n_variables,), whose distribution to work out.
         needed: shape (n_variables,): only components with one of these are looked at; None for all components.
         width_limit: largest number of entries of a table.
+        rung: what to try with components past the limit.
     """
     flat, folded = fold(potentials)
     core, leaves = peel(flat, maximise=False)
@@ -148,11 +160,11 @@ def distributions_of(
     for batch in batches(division, take):
         _list_worlds(batch, found)
     for part in parts(division, take):
-        _eliminate(part, wanted, width_limit, found)
+        _sum(part, wanted[part.variables], width_limit, rung, found)
     put_back_distributions(leaves, found.start, found.probability)
     unfold(folded, found.start, found.probability)
     for component in np.unique(found.label[changed_by(gone)]).tolist():
-        found.method[component] = found.method[component] and ELIMINATION
+        found.method[component] = found.method[component].replace(CLOSED_FORM, ELIMINATION)
     return found
 
 
@@ -186,18 +198,21 @@ def _list_worlds(batch: Batch, found: Distributions) -> None:
     found.largest_table = max(found.largest_table, flat.shape[1])
 
 
-def _eliminate(part: Part, wanted: Bool, width_limit: int, found: Distributions) -> None:
-    """Sums over all worlds of a large component."""
+def _sum(part: Part, wanted: Bool, width_limit: int, rung: Rung | None, found: Distributions) -> None:
+    """Sums over all worlds of a large component, and writes them down."""
     scopes = [c.scope for c in part.cells]
     tree = plan(part.cardinality, scopes, width_limit, max(MEMORY_LIMIT, width_limit))
-    if isinstance(tree, TooWide):
-        found.wide.append((part, tree))
+    if isinstance(tree, Tree):
+        summed: Summed | None = Summed(*log_sum(tree, part.cardinality, part.cells, wanted), ELIMINATION)
+        found.largest_table = max(found.largest_table, *tree.sizes)
+    else:
+        summed = rung(part, wanted) if rung is not None else None
+    if summed is None:
+        found.wide += [(part, tree)] if isinstance(tree, TooWide) else []
         return
-    total, distributions = log_sum(tree, part.cardinality, part.cells, wanted[part.variables])
-    found.log_z[part.component] = total
-    found.method[part.component] = ELIMINATION
-    found.largest_table = max(found.largest_table, *tree.sizes)
-    for v, distribution in distributions.items():
+    found.log_z[part.component], found.method[part.component] = summed.log_z, summed.method
+    found.guessed += [] if summed.exact else [part.component]
+    for v, distribution in summed.distributions.items():
         begin = found.start[part.variables[v]]
         found.probability[begin : begin + len(distribution)] = distribution
 

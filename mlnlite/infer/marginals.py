@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mlnlite.ground.network import Bool, Float, Int64
+from mlnlite.infer.bp import LOOPY
 from mlnlite.infer.ladder import Solution
 from mlnlite.results import Marginals, Statistics
 
@@ -61,6 +62,10 @@ def status_of(names: Sequence[str], source: Int64, solution: Solution) -> str:
     used = source[source >= 0]
     if solution.exact[used].all():
         return "exact"
+    guessed = {m for m in solution.methods if m.startswith(LOOPY)}
+    if guessed:
+        settled = "" if guessed == {LOOPY} else "; messages did not settle"
+        return f"approximate: {LOOPY}, errors not known{settled}"
     error = float(np.nanmax(solution.error[used]))
     parts = [f"sampled, standard errors up to {error:.4f}"]
     parts += [word for end, word in _ENDINGS.items() if end in solution.endings]

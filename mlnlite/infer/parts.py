@@ -69,6 +69,23 @@ class PartAnswer:
 
 
 @dataclass(frozen=True, slots=True)
+class Summed:
+    """What sums over all worlds of a component are, or what is taken for them.
+
+    Attributes:
+        log_z: log of the sum of all weights, minus infinity if no world is possible, nan if not known.
+        distributions: of the variables that were asked for.
+        method: how they were found.
+        exact: whether that is more than a guess.
+    """
+
+    log_z: float
+    distributions: dict[int, Float]
+    method: str
+    exact: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Division:
     """The components of potentials.
 

@@ -105,6 +105,8 @@ class Marginals(Rows[float]):
         p, error = self.probabilities[i], self.error[i]
         if self.exact[i]:
             return f"{p:.4f}"
+        if np.isnan(error):
+            return f"about {p:.4f}"
         if (
             self.draws
             and self.r_hat is not None
