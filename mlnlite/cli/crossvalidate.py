@@ -13,6 +13,7 @@ from mlnlite.cli.options import dialect_option, format_option, names, output_opt
 from mlnlite.cli.terminal import working
 
 if TYPE_CHECKING:
+    from mlnlite.learn.folds import By
     from mlnlite.learn.learned import Objective
     from mlnlite.syntax.tree import Dialect
 
@@ -21,7 +22,7 @@ class _Options(TypedDict):
     files: tuple[Path, ...]
     model: tuple[Path, ...]
     database: tuple[Path, ...]
-    objective: Objective
+    objective: Objective | None
     open_predicates: tuple[str, ...]
     prior_sd: float | None
     prior: str
@@ -29,6 +30,7 @@ class _Options(TypedDict):
     given: tuple[str, ...]
     by: Literal["database", "cluster"]
     hold_out: tuple[str, ...]
+    hold_out_constants: tuple[str, ...]
     folds: int
     repeats: int
     seed: int
@@ -53,6 +55,12 @@ class _Options(TypedDict):
 @click.option(
     "--hold-out", multiple=True, metavar="NAMES", help="Keep databases together that agree in the facts about these."
 )
+@click.option(
+    "--hold-out-constants",
+    multiple=True,
+    metavar="TYPES",
+    help="Keep databases together that share a constant of these types.",
+)
 @click.option("--folds", type=click.IntRange(min=2), default=10, show_default=True, help="How many folds.")
 @click.option(
     "--repeats", type=click.IntRange(min=1), default=1, show_default=True, help="How often, with other folds."
@@ -71,8 +79,11 @@ def crossvalidate(**options: Unpack[_Options]) -> None:
     import mlnlite as ml
 
     models, files = split_files(options["files"], options["model"], options["database"])
-    key = tuple(names(options["hold_out"]))
-    split = ml.Split("key" if key else options["by"], key, options["folds"], options["repeats"], options["seed"])
+    key, types = names(options["hold_out"]), names(options["hold_out_constants"])
+    if key and types:
+        raise click.UsageError("--hold-out and --hold-out-constants exclude each other")
+    by: By = "key" if key else "constant" if types else options["by"]
+    split = ml.Split(by, tuple(key or types), options["folds"], options["repeats"], options["seed"])
     prior = prior_of(options["prior"], options["prior_sd"])
     training = ml.Training(options["objective"], tuple(names(options["open_predicates"])), prior)
     with working("reading"):

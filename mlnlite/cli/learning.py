@@ -29,17 +29,17 @@ _OPTIONS = (
     click.option("-d", "--database", type=FILE, multiple=True, metavar="FILE", help="A database, whatever its name."),
     click.option(
         "--objective",
-        type=click.Choice(["pseudo-likelihood", "likelihood", "composite"]),
-        default="pseudo-likelihood",
-        show_default=True,
-        help="`likelihood`: of all that is predicted, exactly; `composite`: of pairs of atoms that share a formula.",
+        type=click.Choice(["pseudo-likelihood", "likelihood", "composite", "max-margin"]),
+        help="`likelihood`: of all that is predicted, exactly or by sampling; `composite`: of pairs of atoms that "
+        "share a formula; `max-margin`: by how much the data beat other worlds. By default pseudo-likelihood, or "
+        "likelihood if some atoms are unknown.",
     ),
     click.option(
         "--open",
         "open_predicates",
         multiple=True,
         metavar="NAMES",
-        help="Predicates whose atoms are unknown where they are not facts; needs `--objective likelihood`.",
+        help="Predicates whose atoms are unknown where they are not facts, as are atoms marked `?`; for likelihoods.",
     ),
     click.option(
         "--prior",

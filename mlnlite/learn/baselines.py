@@ -1,7 +1,8 @@
 """What any method has to beat: predictors that see the same conditions as single features and know no logic.
 
 A predictor is fitted to rows of categorical features (one value for each condition predicate) and labels, and gives
-the probabilities of each value of the label for other rows.
+the probabilities of each value of the label for other rows. A feature that is not known is left out: a look-up compares
+what is known, naive Bayes and logistic regression have nothing to add for it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,12 @@ Row: TypeAlias = tuple[str, ...]
 Predict: TypeAlias = Callable[[Sequence[Row]], Float]
 Fit: TypeAlias = Callable[[Sequence[Row], Int64, int], Predict]
 
+UNKNOWN = ""
+"""The value of a feature that is not known."""
+
+SPREAD = 0.55
+"""Standard deviation of the prior of the weights of logistic regression."""
+
 SMOOTHING = 1.0
 """Pseudo-counts shared by the values of the label, so that no value is impossible."""
 
@@ -39,13 +46,23 @@ def majority(rows: Sequence[Row], labels: Int64, n_values: int) -> Predict:
 
 
 def look_up(rows: Sequence[Row], labels: Int64, n_values: int) -> Predict:
-    """The frequencies among equal rows, drawn to those of all by one pseudo-count; those of all for unseen rows."""
+    """The frequencies among rows that are equal where the row is known, drawn to those of all by one pseudo-count."""
     share = _smoothed(labels, n_values, np.full(n_values, 1 / n_values))
-    seen: dict[Row, list[int]] = defaultdict(list)
-    for row, label in zip(rows, labels.tolist(), strict=True):
-        seen[row].append(label)
-    table = {row: _smoothed(np.array(found), n_values, share) for row, found in seen.items()}
-    return lambda other: np.array([table.get(row, share) for row in other]).reshape(-1, n_values)
+    tables: dict[tuple[int, ...], dict[Row, Float]] = {}
+
+    def table(columns: tuple[int, ...]) -> dict[Row, Float]:
+        seen: dict[Row, list[int]] = defaultdict(list)
+        for row, label in zip(rows, labels.tolist(), strict=True):
+            seen[tuple(row[c] for c in columns)].append(label)
+        return {row: _smoothed(np.array(found), n_values, share) for row, found in seen.items()}
+
+    def one(row: Row) -> Float:
+        known = tuple(c for c, value in enumerate(row) if value != UNKNOWN)
+        if known not in tables:
+            tables[known] = table(known)
+        return tables[known].get(tuple(row[c] for c in known), share)
+
+    return lambda other: np.array([one(row) for row in other]).reshape(-1, n_values)
 
 
 def naive_bayes(rows: Sequence[Row], labels: Int64, n_values: int) -> Predict:
@@ -56,7 +73,9 @@ def naive_bayes(rows: Sequence[Row], labels: Int64, n_values: int) -> Predict:
         of_value: dict[str, Float] = defaultdict(lambda: np.zeros(n_values))
         for value, label in zip(column, labels.tolist(), strict=True):
             of_value[value][label] += 1
-        tables.append({v: np.log((n + 1) / (n_labels + len(of_value))) for v, n in of_value.items()})
+        of_value.pop(UNKNOWN, None)
+        n_known = sum(of_value.values(), np.zeros(n_values))
+        tables.append({v: np.log((n + 1) / (n_known + len(of_value))) for v, n in of_value.items()})
     start = np.log((n_labels + 1) / (n_labels.sum() + n_values))
 
     def predict(other: Sequence[Row]) -> Float:
@@ -68,9 +87,11 @@ def naive_bayes(rows: Sequence[Row], labels: Int64, n_values: int) -> Predict:
 
 
 def pairwise_logistic(rows: Sequence[Row], labels: Int64, n_values: int) -> Predict:
-    """Multinomial logistic regression on single features and pairs of them; Gaussian prior of standard deviation 1."""
+    """Multinomial logistic regression on single features and pairs of them; Gaussian prior."""
+    from threadpoolctl import threadpool_limits  # BLAS threads make vectors of this size slower
+
     names = {name: i for i, name in enumerate(sorted({n for row in rows for n in _pairs(row)}))}
-    inputs, present = _one_hot(rows, names), np.unique(labels)
+    inputs, present, precision = _one_hot(rows, names), np.unique(labels), SPREAD**-2
     target = np.eye(n_values)[labels][:, present]
     shape = (len(names) + 1, len(present))
 
@@ -78,10 +99,11 @@ def pairwise_logistic(rows: Sequence[Row], labels: Int64, n_values: int) -> Pred
         weights = flat.reshape(shape)
         scores = log_softmax(inputs @ weights[:-1] + weights[-1], axis=1)
         away = np.exp(scores) - target
-        slope = np.vstack([inputs.T @ away + weights[:-1], away.sum(axis=0)])
-        return float(-(scores * target).sum() + 0.5 * (weights[:-1] ** 2).sum()), slope.ravel()
+        slope = np.vstack([inputs.T @ away + precision * weights[:-1], away.sum(axis=0)])
+        return float(-(scores * target).sum() + 0.5 * precision * (weights[:-1] ** 2).sum()), slope.ravel()
 
-    found = minimize(loss, np.zeros(shape[0] * shape[1]), jac=True, method="L-BFGS-B", options={"maxiter": 500})
+    with threadpool_limits(1, "blas"):
+        found = minimize(loss, np.zeros(shape[0] * shape[1]), jac=True, method="L-BFGS-B", options={"maxiter": 500})
     weights = np.asarray(found.x).reshape(shape)
 
     def predict(other: Sequence[Row]) -> Float:
@@ -93,7 +115,7 @@ def pairwise_logistic(rows: Sequence[Row], labels: Int64, n_values: int) -> Pred
 
 
 def _pairs(row: Row) -> list[str]:
-    single = [f"{i}={value}" for i, value in enumerate(row)]
+    single = [f"{i}={value}" for i, value in enumerate(row) if value != UNKNOWN]
     return [*single, *(f"{a}&{b}" for a, b in combinations(single, 2))]
 
 

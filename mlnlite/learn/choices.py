@@ -47,8 +47,10 @@ def listed(entries: Mapping[str, Entries], evidence: Evidence, n_weights: int) -
     return found
 
 
-def _untouched(predicate: Predicate, database: Int64, n_values: Int64, evidence: Evidence) -> tuple[int, float]:
-    """Number of choices of a predicate, and the log-likelihood of those that no formula touches.
+def _untouched(
+    predicate: Predicate, database: Int64, n_values: Int64, evidence: Evidence
+) -> tuple[int, NDArray[np.float64]]:
+    """Number of choices of a predicate, and in each database the log-likelihood of those that no formula touches.
 
     Args:
         predicate: which.
@@ -59,7 +61,7 @@ def _untouched(predicate: Predicate, database: Int64, n_values: Int64, evidence:
     sizes = [evidence.present[predicate.types[k]].sum(axis=1).astype(float) for k in predicate.keys]
     n_of_each = np.asarray(np.prod([np.ones(evidence.n_databases), *sizes], axis=0))
     left = n_of_each - np.bincount(database, minlength=evidence.n_databases)
-    return int(n_of_each.sum()), -float(left @ np.log(np.maximum(n_values, 1)))
+    return int(n_of_each.sum()), np.asarray(-left * np.log(np.maximum(n_values, 1)), float)
 
 
 def _n_atoms(predicate: Predicate, evidence: Evidence) -> int:

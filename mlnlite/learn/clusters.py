@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,8 +12,8 @@ from mlnlite.ground.network import Network
 from mlnlite.learn.exact import compiled, conditions
 from mlnlite.learn.learned import LearnedModel
 from mlnlite.learn.merge import Listed, merged
+from mlnlite.learn.objectives import pseudo_listed, tied_of, without_weights, worth_of
 from mlnlite.learn.problem import Problem, problem_of
-from mlnlite.learn.weights import pseudo_listed, without_weights
 from mlnlite.learn.worlds import components
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
@@ -30,18 +32,21 @@ def clustered(learned: LearnedModel, databases: Evidence) -> tuple[Problem, int]
     model = learned.model
     targets = frozenset(model.predicates if learned.how.predict is None else learned.how.predict)
     n_weights = len(learned.weights)
+    tied, worth = tied_of(model, learned.how.tied), worth_of(databases, learned.how.database_weights)
     apart = databases.n_databases < ENOUGH
     if learned.how.objective == "pseudo-likelihood":
         parts = pseudo_listed(model, databases, targets, None)
         groups = _component_groups(model, databases, targets, parts) if apart else [p.database for p in parts]
-        found = problem_of(model, merged(parts, n_weights, groups))
+        found = problem_of(model, merged(parts, n_weights, groups, worth), tied=tied)
         return found, len(np.unique(found.every.group))
     unknown = frozenset(learned.how.open_predicates)
     exact = compiled(without_weights(model), databases, targets, unknown, learned.how.objective)
-    every = merged(exact.every, n_weights, _part_groups(exact.every, apart))
-    known = merged(exact.known, n_weights, _part_groups(exact.known, apart))
-    found = problem_of(model, every, known, tuple(exact.wide))
-    return found, len(np.unique(found.every.group))
+    every = merged(exact.every, n_weights, _part_groups(exact.every, apart), worth)
+    known = merged(exact.known, n_weights, _part_groups(exact.known, apart), worth)
+    times = np.ones(databases.n_databases) if worth is None else worth
+    wide = tuple(replace(w, times=float(times[w.database])) for w in exact.wide)
+    found = problem_of(model, every, known, wide, tied)
+    return found, len(np.unique(found.every.group)) + len(wide)
 
 
 def _part_groups(parts: list[Listed], apart: bool) -> list[Int64]:

@@ -9,18 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite.errors import QueryMistake
+from mlnlite.errors import QueryMistake, did_you_mean
 from mlnlite.learn import metrics
-from mlnlite.learn.baselines import BASELINES, duplicates
+from mlnlite.learn.baselines import BASELINES, UNKNOWN, duplicates
 from mlnlite.learn.evaluate import predictions, target_names, together
-from mlnlite.learn.folds import By, Row, fact_texts, folds, groups, select, without_facts
+from mlnlite.learn.folds import By, Row, fact_texts, folds, groups, select, strata, without_facts
 from mlnlite.learn.learned import Objective
 from mlnlite.learn.metrics import Predictions
 from mlnlite.learn.prior import PRIOR_SD, Prior
 from mlnlite.learn.weights import learn
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
-from mlnlite.model.symbols import Predicate
 
 Float = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -34,8 +33,9 @@ class Split:
     """How the databases are split.
 
     Attributes:
-        by: `database`; `cluster`, equal databases together; `key`, databases with equal facts about `key` together.
-        key: predicates.
+        by: `database`; `cluster`, equal databases together; `key`, databases with equal facts about `key` together;
+            `constant`, databases that share constants of the types of `key` together.
+        key: predicates, or types.
         n_folds: how many folds.
         repeats: how often, with other folds.
         seed: of the folds and of the bootstrap.
@@ -52,7 +52,7 @@ class Split:
 class Training:
     """How the model is learnt in each fold; see `learn`."""
 
-    objective: Objective = "pseudo-likelihood"
+    objective: Objective | None = None
     open_predicates: tuple[str, ...] = ()
     prior: Prior | float | None = PRIOR_SD
 
@@ -117,6 +117,7 @@ class CrossValidation:
         ]
         split = self.split
         way = {"database": "databases", "cluster": "distinct databases", "key": f"keys ({', '.join(split.key)})"}
+        way["constant"] = f"groups that share no {' or '.join(split.key)}"
         lines.append(
             f"{self.n_databases:,} databases, {self.n_groups:,} {way[split.by]} in {split.n_folds} folds, "
             f"{split.repeats} time{'s' * (split.repeats != 1)}"
@@ -174,13 +175,13 @@ def crossvalidate(
     targets = target_names(databases, predict)
     others = [n for n in databases.predicates if n not in targets]
     conditions = others if given is None else _conditions(databases, given, targets)
-    databases = without_facts(databases, set(others) - set(conditions))
     group = groups(databases, split.by, _key(databases, split))
+    databases = without_facts(databases, set(others) - set(conditions))
     if len(np.unique(group)) < 2 or split.n_folds < 2:
         raise QueryMistake("cross-validation needs at least two folds", "give more databases, or another --by")
-    results = []
+    results, kind = [], strata(databases, targets)
     for repeat in range(split.repeats):
-        fold = folds(group, split.n_folds, np.random.default_rng([split.seed, repeat]))
+        fold = folds(group, kind, split.n_folds, np.random.default_rng([split.seed, repeat]))
         results.append(_predicted(model, databases, (targets, conditions), fold, training))
     rows = []
     for name in targets:
@@ -198,11 +199,12 @@ def _conditions(databases: Evidence, given: Iterable[str], targets: Sequence[str
 
 
 def _key(databases: Evidence, split: Split) -> tuple[str, ...]:
+    what, known = ("type", databases.types) if split.by == "constant" else ("predicate", databases.predicates)
     for name in split.key:
-        if name not in databases.predicates:
-            raise QueryMistake(f"there is no predicate {name} to hold out")
-    if split.by == "key" and not split.key:
-        raise QueryMistake("name the predicates whose facts are the key")
+        if name not in known:
+            raise QueryMistake(f"there is no {what} {name} to hold out", did_you_mean(name, list(known)))
+    if split.by in ("key", "constant") and not split.key:
+        raise QueryMistake(f"name the {what}s to hold out")
     return split.key
 
 
@@ -252,7 +254,7 @@ def _predicted(
         data = select(databases, test)
         for i, found in predictions(learned.model, data, targets, closed).items():
             every[int(test[i])] = found
-    return {name: _result(databases, name, conditions, every, fold) for name in targets}
+    return {name: _result(databases, name, conditions, every, fold, training) for name in targets}
 
 
 def _result(
@@ -261,13 +263,14 @@ def _result(
     conditions: Sequence[str],
     every: Mapping[int, Mapping[str, Predictions]],
     fold: Int64,
+    training: Training,
 ) -> _Result:
     numbers = sorted(i for i in every if name in every[i])
     predicate = databases.predicates[name]
     own = together(predicate, [every[i][name] for i in numbers])
     n_labels = [len(every[i][name].label) for i in numbers]
     database = np.repeat(np.array(numbers, np.int64), n_labels)
-    features = _features(databases, predicate, conditions)
+    features = _features(databases, conditions, training)
     rows = [features[i] for i in database.tolist()]
     of = {MODEL: own}
     for method, fit in BASELINES.items():
@@ -281,9 +284,12 @@ def _result(
     return _Result(database, of)
 
 
-def _features(databases: Evidence, predicate: Predicate, conditions: Sequence[str]) -> list[Row]:
-    """For each database, the facts of each condition predicate as one categorical value."""
-    columns = [[", ".join(facts) for facts in fact_texts(databases, [name])] for name in conditions]
+def _features(databases: Evidence, conditions: Sequence[str], training: Training) -> list[Row]:
+    """For each database, the facts of each condition predicate as one categorical value; empty if it is not known."""
+    columns = []
+    for name in conditions:
+        missing = UNKNOWN if databases.predicates[name].marker == "!" or name in training.open_predicates else "none"
+        columns.append([", ".join(facts) or missing for facts in fact_texts(databases, [name])])
     return [tuple(row) for row in zip(*columns, strict=True)] if columns else [()] * databases.n_databases
 
 

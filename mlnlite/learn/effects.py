@@ -12,9 +12,9 @@ from mlnlite.errors import LimitReached, QueryMistake
 from mlnlite.learn import information
 from mlnlite.learn.advice import formula_of
 from mlnlite.learn.learned import LearnedModel
+from mlnlite.learn.objectives import pseudo_problem
 from mlnlite.learn.problem import Problem, log_likelihood
 from mlnlite.learn.solve import best
-from mlnlite.learn.weights import pseudo_problem
 from mlnlite.model.evidence import Evidence
 
 Float = NDArray[np.float64]

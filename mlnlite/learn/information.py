@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,12 @@ def columns(choices: Choices, x: Float, at: Int64) -> tuple[Float, Float]:
     rows, means = (np.asarray(m[:, at].todense(), float) for m in (choices.rows, mean))
     chosen = choices.rows.T @ (weight[:, None] * rows) - mean.T @ (choices.many[:, None] * means)
     return np.asarray(diagonal), np.asarray(chosen)
+
+
+def without_rows(choices: Choices) -> Choices:
+    """No choices, over the same weights."""
+    rows, none = sparse.csr_array((0, choices.rows.shape[1])), np.empty(0)
+    return replace(choices, rows=rows, log_times=none, choice=np.empty(0, np.int64), many=none)
 
 
 def scores(choices: Choices, x: Float) -> sparse.csr_array:

@@ -51,7 +51,7 @@ class Listed:
         database: shape (n_touched,), of each choice.
         unit: shape (n_touched,), number of an atom of each choice; where worlds are listed, number of the part.
         n_choices: number of choices, those included that no formula touches.
-        constant: log-likelihood of the latter.
+        constant: log-likelihood of the latter in each database, shape (n_databases,), or 0 for all.
     """
 
     rows: sparse.csr_array
@@ -60,29 +60,33 @@ class Listed:
     database: Int64
     unit: Int64
     n_choices: int
-    constant: float
+    constant: Float
 
 
-def merged(parts: Sequence[Listed], n_weights: int, groups: Sequence[Int64] | None = None) -> Choices:
+def merged(
+    parts: Sequence[Listed], n_weights: int, groups: Sequence[Int64] | None = None, worth: Float | None = None
+) -> Choices:
     """Choices, equal ones once.
 
     Args:
         parts: what was listed.
         n_weights: number of weights.
         groups: for each part the cluster of each choice: only choices of one cluster are merged. None: all are of one.
+        worth: shape (n_databases,), how much each database counts; None for 1.
     """
     n_touched = np.cumsum([0, *(len(p.database) for p in parts)])
     rows = sparse.csr_array(sparse.vstack([p.rows for p in parts])) if parts else sparse.csr_array((0, n_weights))
     times = np.concatenate([np.empty(0), *(p.times for p in parts)])
     shifted = (p.choice + n for p, n in zip(parts, n_touched, strict=False))
     choice = np.concatenate([np.empty(0, np.int64), *shifted])
-    n_choices, constant = sum(p.n_choices for p in parts), sum(p.constant for p in parts)
+    n_choices, constant = sum(p.n_choices for p in parts), sum(float(_times(p.constant, worth).sum()) for p in parts)
     clusters = [np.zeros(len(p.database), np.int64) for p in parts] if groups is None else groups
     of_choice = np.concatenate([np.empty(0, np.int64), *clusters])
     rows, times, choice, key = _equal_rows(rows, times, choice)
     firsts = np.flatnonzero(np.diff(choice, prepend=-1))
     n_rows = np.diff(np.append(firsts, len(choice)))
-    kept, many = _equal_choices(key, times, firsts, of_choice[choice[firsts]])
+    each = np.concatenate([np.empty(0), *(_times(np.ones(len(p.database)), worth, p.database) for p in parts)])
+    kept, many = _equal_choices(key, times, firsts, of_choice[choice[firsts]], each[choice[firsts]])
     number = np.full(len(firsts), -1, np.int64)
     number[kept] = np.arange(len(kept))
     of_row = np.repeat(number, n_rows)
@@ -105,18 +109,23 @@ def _equal_rows(rows: sparse.csr_array, times: Float, choice: Int64) -> tuple[sp
     return sparse.csr_array(rows[order[start]]), np.add.reduceat(times, start), choice[start], key[:, start]
 
 
-def _equal_choices(key: UInt64, times: Float, firsts: Int64, group: Int64) -> tuple[Int64, Float]:
-    """The first of each kind of choice, and how many there are of it."""
+def _times(values: Float, worth: Float | None, database: Int64 | None = None) -> Float:
+    """Values of databases times their worth."""
+    return values if worth is None else values * (worth if database is None else worth[database])
+
+
+def _equal_choices(key: UInt64, times: Float, firsts: Int64, group: Int64, each: Float) -> tuple[Int64, Float]:
+    """The first of each kind of choice, and what all of that kind count."""
     if not len(firsts):
         return np.empty(0, np.int64), np.empty(0)
     with np.errstate(over="ignore"):
         mixed = _mixed(key + times.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15))
         sums = np.add.reduceat(mixed, firsts, axis=1) + group.astype(np.uint64) * np.uint64(0xD1B54A32D192ED03)
-    _, kept, number, many = np.unique(sums[0], return_index=True, return_inverse=True, return_counts=True)
+    _, kept, number = np.unique(sums[0], return_index=True, return_inverse=True)
     if (sums[1] != sums[1, kept[number.reshape(-1)]]).any():
-        _, kept, many = np.unique(sums, axis=1, return_index=True, return_counts=True)
+        _, kept, number = np.unique(sums, axis=1, return_index=True, return_inverse=True)
     order = np.argsort(kept)
-    return kept[order], many[order].astype(float)
+    return kept[order], np.bincount(number.reshape(-1), each)[order].astype(float)
 
 
 def _row_keys(rows: sparse.csr_array) -> UInt64:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import monotonic
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mlnlite.infer.deadline import Deadline
 
 Float = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ class Optimum:
         value: the function there, L1 penalty included.
         gradient: its largest projected gradient entry.
         iterations: Newton steps.
-        status: `converged`, `no further increase`, `iteration limit` or `time limit`.
+        status: `converged`, `no further increase`, `iteration limit`, `time limit` or `interrupted`.
         history: the function at the start and after each step.
     """
 
@@ -77,7 +78,7 @@ def maximise(
     l1: Float | None = None,
     tolerance: float = 1e-8,
     iterations: int = 500,
-    deadline: float | None = None,
+    deadline: Deadline | None = None,
 ) -> Optimum:
     """The maximum of a concave function, less `l1 @ |x|`, over `|x_i| <= bound`.
 
@@ -88,7 +89,7 @@ def maximise(
         l1: shape (n,), not negative.
         tolerance: of the largest projected gradient entry.
         iterations: most Newton steps.
-        deadline: `time.monotonic()` at which to stop with the best point so far.
+        deadline: when to stop with the best point so far.
     """
     problem = _Problem(function, np.zeros(len(start)) if l1 is None else l1, bound)
     point = _at(problem, np.clip(start, -bound, bound))
@@ -110,13 +111,18 @@ def maximise(
     return Optimum(point.x, point.value, size, len(history) - 1, status, tuple(history))
 
 
-def _why_stop(flat: bool, many: bool, deadline: float | None) -> str:
+def _why_stop(flat: bool, many: bool, deadline: Deadline | None) -> str:
     """Why to stop, empty to go on."""
     if flat:
         return "converged"
-    if deadline is not None and monotonic() > deadline:
-        return "time limit"
+    if deadline is not None and deadline.is_over:
+        return stopped_by(deadline)
     return "iteration limit" if many else ""
+
+
+def stopped_by(deadline: Deadline) -> str:
+    """What ended a search before its end."""
+    return "interrupted" if deadline.stop.is_set() else "time limit"
 
 
 def _at(problem: _Problem, x: Float) -> _Point:

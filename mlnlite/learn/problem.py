@@ -10,8 +10,8 @@ from scipy import sparse
 
 from mlnlite.errors import Contradiction, Diagnostic, ModelMistake
 from mlnlite.learn import likelihood
-from mlnlite.learn.exact import Wide, wide_value
 from mlnlite.learn.merge import Choices
+from mlnlite.learn.wide import Wide, wide_value
 from mlnlite.model.model import Model
 
 Float = NDArray[np.float64]
@@ -27,9 +27,10 @@ class Problem:
         known: those whose likelihood is taken off again: the worlds that agree with the data, where it leaves some
             unknown; None if it does not.
         wide: databases kept as networks.
-        free: indices of the weights to be found.
+        free: indices of the weights to be found; of weights that are tied together, the first.
         weights: all weights; those to be found are 0.
         learnable: which weights are to be learnt at all.
+        share: shape (n_weights, n_free), 1 where a weight is a free one, or tied to it.
     """
 
     every: Choices
@@ -38,10 +39,28 @@ class Problem:
     free: Int64
     weights: Float
     learnable: NDArray[np.bool_]
+    share: sparse.csr_array
+
+    def all_weights(self, x: Float) -> Float:
+        """All weights, where the free ones are `x`."""
+        return np.asarray(self.weights + self.share @ x)
 
 
-def problem_of(model: Model, every: Choices, known: Choices | None = None, wide: tuple[Wide, ...] = ()) -> Problem:
+def problem_of(
+    model: Model,
+    every: Choices,
+    known: Choices | None = None,
+    wide: tuple[Wide, ...] = (),
+    tied: Int64 | None = None,
+) -> Problem:
     """The problem over the free weights.
+
+    Args:
+        model: expanded.
+        every: choices.
+        known: those that agree with the data.
+        wide: databases kept as networks.
+        tied: shape (n_weights,), for each weight the first one that it is equal to; None for itself.
 
     Raises:
         ModelMistake: if there is nothing to learn.
@@ -57,25 +76,31 @@ def problem_of(model: Model, every: Choices, known: Choices | None = None, wide:
     touched = np.diff(every.rows.tocsc().indptr) > 0
     for one in wide:
         touched |= one.every.n_open > 0
-    free = np.flatnonzero(touched & learnable)
+    n = len(weights)
+    tied = np.arange(n) if tied is None else tied
+    free = np.unique(tied[touched & learnable])
+    place = np.searchsorted(free, tied)
+    shares = np.flatnonzero(learnable & np.isin(tied, free))
+    share = sparse.csr_array((np.ones(len(shares)), (shares, place[shares])), shape=(n, len(free)))
     return Problem(
-        _over(model, every, weights, free),
-        None if known is None or not len(known.choice) else _over(model, known, weights, free),
+        _over(model, every, weights, share),
+        None if known is None or not len(known.choice) else _over(model, known, weights, share),
         wide,
         free,
         weights,
         learnable,
+        share,
     )
 
 
-def _over(model: Model, found: Choices, weights: Float, free: Int64) -> Choices:
+def _over(model: Model, found: Choices, weights: Float, share: sparse.csr_array) -> Choices:
     """Choices over the free weights; alternatives that hard formulas forbid are left out."""
     rows = found.rows.tocsc()
     hard = np.isinf(weights)
     stays = _possible(model, rows, hard)
     known = np.flatnonzero((weights != 0) & ~hard)
     log_times = found.log_times - rows[:, known] @ weights[known]
-    kept = sparse.csr_array(rows[:, free])[stays]
+    kept = sparse.csr_array(found.rows @ share)[stays]
     return replace(found, rows=kept, log_times=log_times[stays], choice=found.choice[stays])
 
 
@@ -113,12 +138,9 @@ def log_likelihood(problem: Problem, x: Float) -> tuple[float, Float]:
 
 
 def _wide(problem: Problem, x: Float) -> tuple[float, Float]:
-    weights = problem.weights.copy()
-    weights[problem.free] = x
-    wanted = np.zeros(len(weights), np.bool_)
-    wanted[problem.free] = True
-    value, gradient = wide_value(problem.wide, weights, wanted)
-    return value, gradient[problem.free]
+    wanted = np.asarray(np.diff(problem.share.indptr) > 0)
+    value, gradient = wide_value(problem.wide, problem.all_weights(x), wanted)
+    return value, np.asarray(problem.share.T @ gradient)
 
 
 def information(problem: Problem, x: Float) -> likelihood.Operator:
@@ -143,7 +165,7 @@ def information_diagonal(problem: Problem, x: Float) -> Float:
     """About the diagonal of the same, never below 0."""
     diagonal = likelihood.curvature_diagonal(problem.every, likelihood.at(problem.every, x))
     for one in problem.wide:
-        diagonal = diagonal + np.minimum(one.every.n_open[problem.free], 10.0) / 4
+        diagonal = diagonal + np.minimum(problem.share.T @ one.every.n_open, 10.0) / 4
     return diagonal
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mlnlite.infer.deadline import Deadline
 from mlnlite.learn.newton import Optimum, maximise
 from mlnlite.learn.prior import Hierarchical, OnePrior, Penalty
 from mlnlite.learn.problem import Problem, information, information_diagonal, log_likelihood, one_sided
@@ -16,6 +17,8 @@ Float = NDArray[np.float64]
 
 BOUND = 30.0
 """Largest size of a weight: odds of e^30, 10^13 to 1."""
+
+GRADIENT = "largest gradient entry"
 
 NARROWEST = 0.05
 """Smallest spread that rows of a template are found to have."""
@@ -56,52 +59,56 @@ class Solution:
         optimum: over the free weights.
         unbounded: of each free weight, 1 or -1 if the likelihood alone pushes it to infinity.
         penalty: of all weights, with what was learnt of the prior put in.
+        error: of each free weight, Monte Carlo standard error; None if nothing was sampled.
+        measure: what `optimum.gradient` is.
     """
 
     optimum: Optimum
     unbounded: NDArray[np.int8]
     penalty: Penalty
+    error: Float | None = None
+    measure: str = GRADIENT
 
 
-def solve(problem: Problem, penalty: Penalty, deadline: float | None) -> Solution:
-    """The optimum over the free weights, and which of them have none without a prior."""
+def solve(problem: Problem, penalty: Penalty, deadline: Deadline | None, start: Float) -> Solution:
+    """The optimum over the free weights, looked for from `start`, and which of them have none without a prior."""
     from threadpoolctl import threadpool_limits  # BLAS threads make vectors of this size slower
 
     own = penalty.of(problem.free)
     plain = problem.known is None and not problem.wide
     with threadpool_limits(1, "blas"):
         if plain and not (own.precision + own.l1 + own.cauchy).any():
-            return _without_prior(problem, penalty, deadline)
+            return _without_prior(problem, penalty, deadline, start)
         n = len(problem.free)
         unbounded = one_sided(problem.every)[0] if plain else np.zeros(n, np.int8)
-        optimum = best(problem, own, _start(problem), deadline)
+        optimum = best(problem, own, start, deadline)
         if not own.proper:
             at_bound = (np.abs(optimum.x) >= BOUND) & (own.precision + own.l1 + own.cauchy == 0)
             unbounded[at_bound] = np.sign(optimum.x[at_bound]).astype(np.int8)
         return Solution(optimum, unbounded, penalty)
 
 
-def best(problem: Problem, penalty: Penalty, start: Float, deadline: float | None) -> Optimum:
+def best(problem: Problem, penalty: Penalty, start: Float, deadline: Deadline | None) -> Optimum:
     """The most probable free weights; `penalty` is theirs."""
     tolerance = 1e-8 if not problem.wide and problem.known is None else 1e-6
     return maximise(Posterior(problem, penalty), start, BOUND, l1=penalty.l1, tolerance=tolerance, deadline=deadline)
 
 
-def _start(problem: Problem) -> Float:
+def start_of(problem: Problem) -> Float:
     """Zero; a little off it if some atoms are unknown, as the likelihood can be level there."""
     n = len(problem.free)
     hidden = problem.known is not None or any(w.known.n_atoms for w in problem.wide)
     return 0.1 * np.random.default_rng(0).normal(size=n) if hidden else np.zeros(n)
 
 
-def _without_prior(problem: Problem, penalty: Penalty, deadline: float | None) -> Solution:
+def _without_prior(problem: Problem, penalty: Penalty, deadline: Deadline | None, start: Float) -> Solution:
     """Weights that nothing holds go to the bound first, then the others are found."""
     found = problem.every
     unbounded, left = one_sided(found)
     inner = np.flatnonzero(unbounded == 0)
     rest = replace(found, rows=found.rows[left][:, inner], log_times=found.log_times[left], choice=found.choice[left])
     part = replace(problem, every=rest, free=problem.free[inner])
-    optimum = best(part, penalty.of(part.free), np.zeros(len(inner)), deadline)
+    optimum = best(part, penalty.of(part.free), start[inner], deadline)
     x = BOUND * unbounded.astype(float)
     x[inner] = optimum.x
     at_bound = inner[np.abs(optimum.x) >= BOUND]
@@ -113,7 +120,11 @@ def _without_prior(problem: Problem, penalty: Penalty, deadline: float | None) -
 
 
 def solve_hierarchical(
-    problem: Problem, penalty: Penalty, groups: Sequence[tuple[OnePrior | None, int]], deadline: float | None
+    problem: Problem,
+    penalty: Penalty,
+    groups: Sequence[tuple[OnePrior | None, int]],
+    deadline: Deadline | None,
+    start: Float,
 ) -> Solution:
     """Weights with the means and spreads that rows of templates share.
 
@@ -125,8 +136,9 @@ def solve_hierarchical(
         penalty: of all weights, to start from.
         groups: prior and number of weights of each template.
         deadline: when to stop.
+        start: where to look first.
     """
-    solution = solve(problem, penalty, deadline)
+    solution = solve(problem, penalty, deadline, start)
     for _ in range(ROUNDS):
         x = solution.optimum.x
         sure = information_diagonal(problem, x) + solution.penalty.of(problem.free).precision
@@ -135,7 +147,7 @@ def solve_hierarchical(
         moved += np.abs(np.log(penalty.precision / solution.penalty.precision)).max(initial=0.0)
         optimum = best(problem, penalty.of(problem.free), x, deadline)
         solution = replace(solution, optimum=optimum, penalty=penalty)
-        if moved < 1e-3 or optimum.status == "time limit":
+        if moved < 1e-3 or (deadline is not None and deadline.is_over):
             break
     return solution
 

@@ -21,10 +21,10 @@ from mlnlite.learn import information
 from mlnlite.learn.candidates import candidates, rule_text
 from mlnlite.learn.evaluate import target_names
 from mlnlite.learn.merge import Choices
+from mlnlite.learn.objectives import pseudo_problem
 from mlnlite.learn.prior import Penalty
 from mlnlite.learn.problem import Problem
 from mlnlite.learn.solve import best
-from mlnlite.learn.weights import pseudo_problem
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import AtomRef
 from mlnlite.model.model import Model

@@ -7,7 +7,7 @@ bootstrap (Efron 1979) draws worlds from the learnt model and learns again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,8 +20,12 @@ from mlnlite.learn import information
 from mlnlite.learn.clusters import clustered
 from mlnlite.learn.learned import LearnedModel
 from mlnlite.learn.problem import Problem
-from mlnlite.learn.simulate import simulate
+from mlnlite.learn.problem import information as operator
+from mlnlite.learn.sampled import sampled_scores
+from mlnlite.learn.simulate import APART, simulate
 from mlnlite.learn.weights import learn
+from mlnlite.learn.wide import wide_slopes
+from mlnlite.learn.worlds import MOST_WORLDS
 from mlnlite.model.evidence import Evidence
 
 Float = NDArray[np.float64]
@@ -83,9 +87,11 @@ def uncertainty(
         seed: of the bootstrap.
 
     Raises:
-        QueryMistake: if the level is not between 0 and 1, or there are fewer than two clusters.
-        LimitReached: if worlds cannot be drawn exactly.
+        QueryMistake: if the level is not between 0 and 1, there are fewer than two clusters, or the weights were not
+            learnt from a likelihood.
     """
+    if learned.how.objective == "max-margin" and method != "bootstrap":
+        raise QueryMistake("max-margin weights have no likelihood to tell their errors", "ask for the bootstrap")
     if not 0 < level < 1:
         raise QueryMistake(f"the level of an interval is between 0 and 1, found {level:g}")
     if method == "bootstrap":
@@ -108,7 +114,7 @@ def uncertainty(
 def _sd(covariance: sparse.csr_array, learned: LearnedModel) -> Float:
     variance = covariance.diagonal()
     finite = np.zeros(len(variance), bool)
-    finite[learned.problem.free] = True
+    finite[np.diff(learned.problem.share.indptr) > 0] = True
     finite &= (learned.unbounded == 0) | (learned.prior is not None)
     return np.where(finite & (variance > 0), np.sqrt(np.maximum(variance, 0.0)), np.nan)
 
@@ -118,27 +124,43 @@ def _covariance(learned: LearnedModel, problem: Problem, method: Method) -> spar
 
     The prior counts as one more observation, so that a weight that only the prior holds is as unsure as the prior.
     """
-    free = problem.free
-    x = learned.weights[free]
+    x = learned.weights[problem.free]
     bend = information.hessian(problem.every, x)
     if problem.known is not None:
         bend = sparse.csr_array(bend - information.hessian(problem.known, x))
-    pull = learned.penalty.of(free).smooth(x)[2]
-    bend = sparse.csr_array(bend + sparse.diags_array(pull))
-    slopes = _scores(problem, x) if method == "sandwich" else None
+    wide, more = _wide(learned, problem, x)
+    pull = learned.penalty.of(problem.free).smooth(x)[2]
+    bend = sparse.csr_array(bend + more + sparse.diags_array(pull))
+    slopes = sparse.vstack([_scores(problem, x), wide], format="csr") if method == "sandwich" else None
     rows, columns, data = [], [], []
     for block in information.blocks(bend):
         inverse = np.linalg.pinv(information.dense(bend, block), rcond=1e-12, hermitian=True)
         if slopes is not None:
             meat = _meat(np.asarray(slopes[:, block].todense(), float)) + np.diag(pull[block])
             inverse = inverse @ meat @ inverse
-        grid = np.meshgrid(free[block], free[block], indexing="ij")
+        grid = np.meshgrid(block, block, indexing="ij")
         rows.append(grid[0].ravel())
         columns.append(grid[1].ravel())
         data.append(inverse.ravel())
-    n = len(problem.weights)
+    n = len(x)
     entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
-    return sparse.csr_array(entries, shape=(n, n))
+    return sparse.csr_array(problem.share @ sparse.csr_array(entries, shape=(n, n)) @ problem.share.T)
+
+
+def _wide(learned: LearnedModel, problem: Problem, x: Float) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Scores of the databases kept as networks, and what they add to minus the Hessian: as they were learnt from."""
+    n = len(x)
+    if learned.monte_carlo.any():
+        slopes, bend = sampled_scores(problem, x, 0)
+        return sparse.csr_array(slopes), sparse.csr_array(bend)
+    if not problem.wide:
+        return sparse.csr_array((0, n)), sparse.csr_array((n, n))
+    wanted = np.asarray(np.diff(problem.share.indptr) > 0)
+    slopes = wide_slopes(problem.wide, problem.all_weights(x), wanted)
+    only = replace(problem, every=information.without_rows(problem.every), known=None)
+    product = operator(only, x)
+    bend = np.column_stack([product(direction) for direction in np.eye(n)])
+    return sparse.csr_array(slopes @ problem.share), sparse.csr_array((bend + bend.T) / 2)
 
 
 def _scores(problem: Problem, x: Float) -> sparse.csr_array:
@@ -165,15 +187,19 @@ def _meat(slopes: Float) -> Float:
 
 def _bootstrap(learned: LearnedModel, databases: Evidence, level: float, repetitions: int, seed: int) -> Uncertainty:
     """Worlds drawn from the learnt model, learnt from again."""
-    random = np.random.default_rng(seed)
+    random, how = np.random.default_rng(seed), learned.how
+    approximate, simulated = simulate(learned, databases, repetitions, random)
     draws = []
-    for data in simulate(learned, databases, repetitions, random):
+    for data in simulated:
         again = learn(
             learned.model,
             data,
-            objective=learned.how.objective,
-            predict=learned.how.predict,
+            objective=how.objective,
+            predict=how.predict,
+            open_predicates=how.open_predicates,
             prior=learned.prior,
+            tied=how.tied,
+            database_weights=how.database_weights,
         )
         draws.append(again.weights)
     table = np.array(draws)
@@ -184,4 +210,5 @@ def _bootstrap(learned: LearnedModel, databases: Evidence, level: float, repetit
     low, high = learned.weights - shift[0], learned.weights - shift[1]
     missing = np.isnan(sd)
     low, high = (np.where(missing, np.nan, end) for end in (low, high))
-    return Uncertainty(sd, low, high, level, "bootstrap", 0, covariance)
+    drawn = f"components of more than {MOST_WORLDS:,} worlds were drawn by sampling, {APART} sweeps apart, not exactly"
+    return Uncertainty(sd, low, high, level, "bootstrap", 0, covariance, (drawn,) if approximate else ())

@@ -85,14 +85,14 @@ def n_worlds(network: Network, part: Int64) -> float:
     return float(np.prod(network.cardinality[part].astype(float)))
 
 
-def list_worlds(network: Network, values: Int64, parts: Sequence[Int64], database: int) -> Worlds:
+def list_worlds(network: Network, values: Int64, parts: Sequence[Int64], excluded: Int64) -> Worlds:
     """The worlds of some parts of a network, everything else being as in the data.
 
     Args:
         network: in which everything predicted is unknown.
         values: shape (n_variables,), value of each variable in the data, -1 for unknown.
         parts: the variables of each part.
-        database: number of the database.
+        excluded: shape (n, 2), variables that are not known, and values that they do not have.
     """
     touching = incidence(network)
     hard = np.isposinf(network.weights)
@@ -101,6 +101,8 @@ def list_worlds(network: Network, values: Int64, parts: Sequence[Int64], databas
         table = _table(network, values, part, touching)
         given = values[part] >= 0
         agrees = (table.grid[:, given] == values[part][given]).all(axis=1)
+        for v, value in excluded[np.isin(excluded[:, 0], part)].tolist():
+            agrees &= table.grid[:, part.tolist().index(v)] != value
         fits = np.flatnonzero(agrees)
         reference = int(fits[table.counts[fits][:, hard[table.weights]].sum(axis=1).argmax()])
         others = np.arange(len(agrees)) != reference
@@ -108,7 +110,7 @@ def list_worlds(network: Network, values: Int64, parts: Sequence[Int64], databas
         for rows, chosen in ((every, others), (known, others & agrees)):
             rows.columns.append(table.weights)
             rows.change.append(change[chosen])
-    return Worlds(*(_listed(rows, len(network.weights), database) for rows in (every, known)))
+    return Worlds(*(_listed(rows, len(network.weights)) for rows in (every, known)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +121,7 @@ class _Rows:
     change: list[Float]
 
 
-def _listed(rows: _Rows, n_weights: int, database: int) -> Listed:
+def _listed(rows: _Rows, n_weights: int) -> Listed:
     lengths = np.array([len(c) for c in rows.change], np.int64)
     widths = np.array([len(c) for c in rows.columns], np.int64)
     data = np.concatenate([np.empty(0), *(c.ravel() for c in rows.change)])
@@ -131,8 +133,8 @@ def _listed(rows: _Rows, n_weights: int, database: int) -> Listed:
     matrix.eliminate_zeros()
     filled = np.flatnonzero(lengths)
     choice = np.repeat(np.arange(len(filled)), lengths[filled])
-    world = np.full(len(filled), database)
-    return Listed(matrix, np.ones(len(choice)), choice, world, filled.astype(np.int64), len(lengths), 0.0)
+    world = np.zeros(len(filled), np.int64)
+    return Listed(matrix, np.ones(len(choice)), choice, world, filled.astype(np.int64), len(lengths), np.zeros(1))
 
 
 def world_counts(network: Network, part: Int64) -> WorldTable:

@@ -60,8 +60,14 @@ def test_objectives(files):
         "learn", files / "m.mln", files / "d.db", "--objective", "likelihood", "--predict", "C", "-o", files / "o"
     )
     assert result.stdout.startswith("conditional log-likelihood")
-    refused = run("learn", files / "m.mln", files / "d.db", "--open", "C", code=2)
-    assert "--objective likelihood" in refused.output
+    opened = run("learn", files / "m.mln", files / "d.db", "--open", "C", "-o", files / "o")
+    assert opened.stdout.startswith("log-likelihood")
+    words = ("learn", files / "m.mln", files / "d.db", "--open", "C", "--objective", "pseudo-likelihood")
+    assert "--objective likelihood" in run(*words, code=2).output
+    wide = run(
+        "learn", files / "m.mln", files / "d.db", "--objective", "max-margin", "--predict", "C", "-o", files / "o"
+    )
+    assert "converged" in wide.stdout
 
 
 def test_structure(files):

@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given, settings
 
 import mlnlite as ml
-from mlnlite.learn import exact, weights
+from mlnlite.learn import exact
+from mlnlite.learn.learned import How
+from mlnlite.learn.objectives import task_of
 from mlnlite.learn.problem import log_likelihood
 from tests import brute
 from tests.models import evidence_texts, model_texts
@@ -20,8 +22,8 @@ def problem_of(text, databases, targets, unknown=(), objective="likelihood"):
     model = ml.model_from_text(text.replace("F(a, c!)\n", ""))
     evidence = ml.evidence_from_text("\n---\n".join(databases), model=model)
     model = replace(model, templates=tuple(t.expanded(evidence.types) for t in model.templates))
-    found = weights._exact_problem(model, evidence, frozenset(targets), frozenset(unknown), objective, None)
-    return model, evidence, found
+    how = How(objective, None, tuple(unknown))
+    return model, evidence, task_of(model, evidence, how, frozenset(targets), None).problem
 
 
 def with_weights(model, problem, x):

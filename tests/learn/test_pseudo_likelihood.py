@@ -14,7 +14,7 @@ from mlnlite.engines.duckdb import DuckDBEngine
 from mlnlite.engines.numpy import NumpyEngine
 from mlnlite.learn import likelihood
 from mlnlite.learn.merge import merged
-from mlnlite.learn.weights import pseudo_listed
+from mlnlite.learn.objectives import pseudo_listed
 from tests import brute
 from tests.models import evidence_texts, model_texts
 

@@ -1,0 +1,92 @@
+"""Atoms marked `?` are unknown: neither false nor ignored. All against listing every world."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mlnlite as ml
+from mlnlite.learn import exact
+from mlnlite.learn.problem import log_likelihood
+from mlnlite.model.evidence import Facts
+from tests import brute
+from tests.learn.test_exact_likelihood import log_sum, problem_of, with_weights
+
+TEXT = "P(a)\nQ(a)\nG(a, c!)\nO(a, c?)\nP(x) => Q(x)\nQ(x) ^ Q(y)\nP(x) ^ G(x, +k)\nO(x, +k) ^ G(x, +k)\n"
+EVERY = "a = {A, B}\nc = {C1, C2, C3}\n"
+CASES = [
+    ("P(A)\nQ(A)\n?Q(B)\nG(A, C1)\nG(B, C2)", ["P", "Q"], {"Q": ["B"]}),
+    ("P(A)\nQ(A)\n?P(B)\nG(A, C1)\nG(B, C2)", ["Q"], {"P": ["B"]}),
+    ("P(A)\nQ(B)\n?G(A, C1)\n?G(A, C3)\nG(B, C2)", ["Q", "G"], {"G": ["A, C1", "A, C3"]}),
+    ("P(A)\nQ(B)\n?G(A, C1)\n?G(A, C2)\nG(B, C2)", ["Q"], {"G": ["A, C1", "A, C2"]}),
+    ("P(A)\nQ(B)\nG(A, C1)\nG(B, C2)\nO(A, C1)\n?O(B, C3)", ["O"], {"O": ["B, C3"]}),
+    ("P(A)\nQ(B)\nG(A, C1)\nG(B, C2)\n?O(B, C3)\n?Q(A)", ["P", "O"], {"O": ["B, C3"], "Q": ["A"]}),
+]
+
+
+def observed(model, facts, targets, marked):
+    """log P(what is known of the targets | what is known of the rest), by listing worlds."""
+    lines = [line for line in facts.split("\n") if not line.startswith("?")]
+    data = ml.evidence_from_text(EVERY + "\n".join(lines), model=model)
+    allowed = {
+        (name, tuple(data.types[t].index[c] for t, c in zip(data.predicates[name].types, a.split(", "), strict=True)))
+        for name, atoms in marked.items()
+        for a in atoms
+    }
+    known = {k for k, truth in brute.facts(data).items() if truth}
+
+    def weights(open_targets):
+        none = {n: Facts(f.database[:0], f.arguments[:0], f.truth[:0]) for n, f in data.facts.items()}
+        empty = replace(data, facts=none)
+        for world in brute.worlds(model, empty):
+            free = allowed | {a for a in world if open_targets and a[0] in targets}
+            if all(a in free or truth == (a in known) for a, truth in world.items()):
+                yield brute.log_weight(model, data, world)
+
+    return log_sum(weights(open_targets=False)) - log_sum(weights(open_targets=True))
+
+
+@pytest.mark.parametrize("way", ["list", "eliminate"])
+@pytest.mark.parametrize(("facts", "targets", "marked"), CASES)
+def test_marked_atoms_are_summed_over(facts, targets, marked, way, monkeypatch):
+    if way == "eliminate":
+        monkeypatch.setattr(exact, "MOST_WORLDS", 0)
+    model, _, problem = problem_of(TEXT, [EVERY + facts], targets)
+    x = np.random.default_rng(0).normal(size=len(problem.free))
+    value, gradient = log_likelihood(problem, x)
+    assert value == pytest.approx(observed(with_weights(model, problem, x), facts, targets, marked), abs=1e-8)
+    for i in range(len(x)):
+        step = 1e-5 * np.eye(len(x))[i]
+        slope = (log_likelihood(problem, x + step)[0] - log_likelihood(problem, x - step)[0]) / 2e-5
+        assert gradient[i] == pytest.approx(slope, abs=1e-5)
+
+
+def test_the_objective_follows_the_data():
+    model = ml.model_from_text("P(a)\nG(a, c!)\nP(x) ^ G(x, +k)\nP(x)")
+    complete = ml.evidence_from_text("P(A)\nG(A, C1)\nG(B, C2)", model=model)
+    assert ml.learn(model, complete).how.objective == "pseudo-likelihood"
+    for facts in ("?P(A)\nP(B)\nG(A, C1)\nG(B, C2)", "P(A)\nP(B)\nG(A, C1)"):
+        data = ml.evidence_from_text(facts, model=model)
+        learned = ml.learn(model, data, predict=["P"])
+        assert learned.how.objective == "likelihood"
+        assert learned.status == "converged"
+        with pytest.raises(ml.QueryMistake, match="need the likelihood"):
+            ml.learn(model, data, predict=["P"], objective="pseudo-likelihood")
+
+
+def test_a_missing_atom_is_not_a_false_one():
+    """Three of four known people smoke; of the fifth nothing is known."""
+    model = ml.model_from_text("S(p)\nS(x)\np = {A, B, C, D, E}")
+    unknown = ml.evidence_from_text("S(A)\nS(B)\nS(C)\n?S(E)", model=model)
+    assert ml.learn(model, unknown, prior=None).weights == pytest.approx([np.log(3)], abs=1e-5)
+    false = ml.evidence_from_text("S(A)\nS(B)\nS(C)", model=model)
+    assert ml.learn(model, false, prior=None).weights == pytest.approx([np.log(1.5)], abs=1e-6)
+
+
+def test_probabilities_are_refused():
+    model = ml.model_from_text("S(p)\nS(x)\n")
+    data = ml.evidence_from_text("0.7 S(A)\nS(B)", model=model)
+    with pytest.raises(ml.EvidenceMistake, match="has a probability"):
+        ml.learn(model, data)
