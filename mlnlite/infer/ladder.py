@@ -16,6 +16,7 @@ from mlnlite.infer.approach import PATIENCE, SAMPLERS, Approach
 from mlnlite.infer.deadline import in_seconds
 from mlnlite.infer.formula import formula_probabilities
 from mlnlite.infer.marginal import ELIMINATION, AtomProbabilities, Rung, marginals_of
+from mlnlite.infer.parts import Part, Summed
 from mlnlite.infer.query import atom_numbers
 from mlnlite.infer.wmc import MODEL_COUNTING, count_models, is_available, is_mostly_hard, verify_available
 from mlnlite.model.formulas import Expression
@@ -92,6 +93,8 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
     methods = [found.method[a] for a in atoms.tolist()]
     _enter(solution, np.arange(len(atoms)), found.probability[atoms], found.exact[atoms], methods)
     _formulas_exactly(network, solution, found, (len(atoms), formulas), approach)
+    if len(found.wide) > 1:
+        atoms = _with_twins(network, found, atoms, np.isnan(solution.probability[: len(atoms)]))
     jobs = sorted(_jobs(found, (atoms, formulas), np.flatnonzero(np.isnan(solution.probability))), key=_n_rows)
     deadline = in_seconds(PATIENCE if approach.time_limit is None else approach.time_limit)
     for i, (components, rows) in enumerate(jobs):
@@ -115,7 +118,7 @@ def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple
         from mlnlite.ground.patterns import with_counts
 
         refuses = approach.method == "exact"
-        network, rung = with_counts(network), _rung_for_wide(approach)
+        network, rung = with_counts(network), _rung_for_wide(network, approach)
         found = marginals_of(network, asked, width_limit=limit, too_wide="raise" if refuses else "leave", rung=rung)
     return network, found
 
@@ -137,13 +140,29 @@ def _rung_by_name(approach: Approach) -> Rung | None:
     return lambda part, wanted: count_models(part, wanted, deadline)
 
 
-def _rung_for_wide(approach: Approach) -> Rung | None:
+def _rung_for_wide(network: Network, approach: Approach) -> Rung | None:
     """Model counting of components that are mostly hard, if that is installed; for a sixth of the time."""
     limit = PATIENCE if approach.time_limit is None else approach.time_limit
     deadline = in_seconds(limit / _SHARE)
     if not is_available():
         return None
-    return lambda part, wanted: count_models(part, wanted, deadline) if is_mostly_hard(part) else None
+
+    def rung(part: Part, wanted: Bool) -> Summed | None:
+        try:
+            return count_models(part, wanted, deadline) if is_mostly_hard(part, network.n_variables) else None
+        except LimitReached:
+            return None
+
+    return rung
+
+
+def _with_twins(network: Network, found: AtomProbabilities, atoms: Int64, which: Bool) -> Int64:
+    """Some of the atoms replaced by those that correspond to them in the first of isomorphic components."""
+    from mlnlite.ground.isomorphism import copies
+
+    component = np.zeros(network.n_variables, np.int32)
+    component[network.variable] = found.component
+    return np.where(which, copies(network, component).twin[atoms], atoms)
 
 
 def _n_rows(job: tuple[Int64, Int64]) -> int:

@@ -14,7 +14,7 @@ from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.elimination import log_sum
 from mlnlite.infer.fold import fold, unfold
 from mlnlite.infer.order import TooWide, Tree, plan
-from mlnlite.infer.parts import Batch, Division, Part, Summed, batches, divide, parts
+from mlnlite.infer.parts import Batch, Division, Part, Summed, batches, divide, identity, parts
 from mlnlite.infer.peel import (
     Gone,
     changed_by,
@@ -159,8 +159,13 @@ def distributions_of(
         take = np.bincount(division.label[needed], minlength=division.n_components) > 0
     for batch in batches(division, take):
         _list_worlds(batch, found)
+    known: dict[object, Summed | TooWide] = {}
     for part in parts(division, take):
-        _sum(part, wanted[part.variables], width_limit, rung, found)
+        own = wanted[part.variables]
+        key = identity(part), own.tobytes()
+        if key not in known:
+            known[key] = _summed(part, own, width_limit, rung, found)
+        _enter(part, known[key], found)
     put_back_distributions(leaves, found.start, found.probability)
     unfold(folded, found.start, found.probability)
     for component in np.unique(found.label[changed_by(gone)]).tolist():
@@ -198,17 +203,20 @@ def _list_worlds(batch: Batch, found: Distributions) -> None:
     found.largest_table = max(found.largest_table, flat.shape[1])
 
 
-def _sum(part: Part, wanted: Bool, width_limit: int, rung: Rung | None, found: Distributions) -> None:
-    """Sums over all worlds of a large component, and writes them down."""
+def _summed(part: Part, wanted: Bool, width_limit: int, rung: Rung | None, found: Distributions) -> Summed | TooWide:
+    """Sums over all worlds of a large component."""
     scopes = [c.scope for c in part.cells]
     tree = plan(part.cardinality, scopes, width_limit, max(MEMORY_LIMIT, width_limit))
     if isinstance(tree, Tree):
-        summed: Summed | None = Summed(*log_sum(tree, part.cardinality, part.cells, wanted), ELIMINATION)
         found.largest_table = max(found.largest_table, *tree.sizes)
-    else:
-        summed = rung(part, wanted) if rung is not None else None
-    if summed is None:
-        found.wide += [(part, tree)] if isinstance(tree, TooWide) else []
+        return Summed(*log_sum(tree, part.cardinality, part.cells, wanted), ELIMINATION)
+    return (rung(part, wanted) if rung is not None else None) or tree
+
+
+def _enter(part: Part, summed: Summed | TooWide, found: Distributions) -> None:
+    """Writes down what is known of a large component."""
+    if isinstance(summed, TooWide):
+        found.wide.append((part, summed))
         return
     found.log_z[part.component], found.method[part.component] = summed.log_z, summed.method
     found.guessed += [] if summed.exact else [part.component]

@@ -208,6 +208,12 @@ def parts(division: Division, take: Bool) -> Iterator[Part]:
             yield Part(int(number[r]), variables, division.potentials.cardinality[variables], cells)
 
 
+def identity(part: Part) -> object:
+    """Equal for components that differ in the names of their variables only (if they stand in the same order)."""
+    arrays = [a.tobytes() for c in part.cells for a in (c.scope, c.value, c.amount)]
+    return part.cardinality.tobytes(), *arrays
+
+
 def all_gains(part: Part) -> float:
     """The sum of all gains, which no world can pass."""
     return float(sum(c.amount[c.amount > 0].sum() for c in part.cells))

@@ -11,7 +11,7 @@ from mlnlite.errors import QueryMistake
 from mlnlite.ground.network import Int64
 from mlnlite.infer import annealing, ilp, maxsat, mincut, relaxation, toulbar2, walksat
 from mlnlite.infer.deadline import Deadline
-from mlnlite.infer.parts import Part, PartAnswer, all_gains, value_of
+from mlnlite.infer.parts import Part, PartAnswer, all_gains, identity, value_of
 from mlnlite.infer.workers import Ask, workers
 
 Method = Literal["auto", "ve", "mincut", "ilp", "wcsp", "maxsat", "annealing", "maxwalksat"]
@@ -60,17 +60,11 @@ def answers_of(parts: Sequence[Part], options: Options) -> Iterator[list[PartAns
     known: dict[object, list[PartAnswer]] = {}
     with workers() as ask:
         for i, part in enumerate(parts):
-            key = _identity(part)
+            key = identity(part)
             if key not in known:
                 deadline = options.deadline.within(options.deadline.left / (len(parts) - i))
                 known[key] = _search(part, options, deadline, ask)
             yield known[key]
-
-
-def _identity(part: Part) -> object:
-    """Equal for components that differ in the names of their variables only (if they stand in the same order)."""
-    arrays = [a.tobytes() for c in part.cells for a in (c.scope, c.value, c.amount)]
-    return part.cardinality.tobytes(), *arrays
 
 
 def _search(part: Part, options: Options, deadline: Deadline, ask: Ask) -> list[PartAnswer]:

@@ -37,11 +37,18 @@ def verify_available() -> None:
         raise MissingPart("the model counter Ganak is not installed", hint="pip install 'mlnlite[wmc]'")
 
 
-def is_mostly_hard(part: Part) -> bool:
-    """Whether counting models is worth a try: most cells over several variables are forbidden."""
-    several = [c for c in part.cells if c.scope.shape[1] > 1]
-    n_hard = sum(int(np.isneginf(c.amount).sum()) for c in several)
-    return n_hard > _HARD_SHARE * sum(len(c.amount) for c in several)
+def is_mostly_hard(part: Part, n_variables: int) -> bool:
+    """Whether counting models is worth a try: most cells over several variables are forbidden.
+
+    Args:
+        part: a component.
+        n_variables: of the network; what defines auxiliary ones after these is hard in any network.
+    """
+    several = [
+        c.amount[(part.variables[c.scope] < n_variables).all(axis=1)] for c in part.cells if c.scope.shape[1] > 1
+    ]
+    amounts = np.concatenate([np.zeros(0), *several])
+    return bool(np.isneginf(amounts).sum() > _HARD_SHARE * len(amounts))
 
 
 def count_models(part: Part, wanted: Bool, deadline: Deadline) -> Summed | None:
@@ -66,7 +73,7 @@ def count_models(part: Part, wanted: Bool, deadline: Deadline) -> Summed | None:
     if reply is None:
         return None
     total = float(reply["total"])
-    if total == 0.0 and problem["clauses"] and _has_model(problem):
+    if total == 0.0 and _has_model(problem):
         raise LimitReached("the weight of all worlds is too small for the model counter", hint="ask for `auto`")
     if total == 0.0:
         return Summed(-np.inf, {}, MODEL_COUNTING)
@@ -91,6 +98,8 @@ def _problem(part: Part) -> tuple[dict[str, Any], float, Int64]:
     The weights of what a variable may be add up to 1, so that no sum is larger than that. A cell over several variables
     that changes the weight is a new variable, true exactly where the cell is.
     """
+    from scipy.special import expit
+
     size = np.where(part.cardinality == 2, 1, part.cardinality).astype(np.int64)
     first = np.cumsum(size) - size + 1
     own = [np.zeros(k) for k in part.cardinality.tolist()]
@@ -107,8 +116,7 @@ def _problem(part: Part) -> tuple[dict[str, Any], float, Int64]:
             elif amount:
                 n_variables += 1
                 clauses += [[-n_variables, x] for x in literals] + [[n_variables, *(-x for x in literals)]]
-                yes = float(1 / (1 + np.exp(-amount)))
-                weights += [(n_variables, yes), (-n_variables, 1 - yes)]
+                weights += [(n_variables, float(expit(amount))), (-n_variables, float(expit(-amount)))]
                 constant += float(np.logaddexp(amount, 0.0))
     for v, gain in enumerate(own):
         literals = [_literal(part, first, v, k) for k in range(len(gain))]
@@ -121,15 +129,15 @@ def _problem(part: Part) -> tuple[dict[str, Any], float, Int64]:
         constant += log_sum
         weights += list(zip(literals, np.exp(gain - log_sum).tolist(), strict=True))
         weights += [(-x, 1.0) for x in literals] if len(gain) > 2 else []
+        clauses += [[-x] for x, amount in zip(literals, gain.tolist(), strict=True) if amount == -np.inf]
     return {"n_variables": n_variables, "clauses": clauses, "weights": weights}, constant, first
 
 
 def _has_model(problem: dict[str, Any]) -> bool:
-    """Whether the clauses can be satisfied, literals of weight 0 left out."""
+    """Whether the clauses can be satisfied."""
     from pysat.solvers import Solver
 
-    never = [[-literal] for literal, weight in problem["weights"] if weight == 0.0]
     if [] in problem["clauses"]:
         return False
-    with Solver(name="cadical153", bootstrap_with=problem["clauses"] + never) as solver:
+    with Solver(name="cadical153", bootstrap_with=problem["clauses"]) as solver:
         return bool(solver.solve())

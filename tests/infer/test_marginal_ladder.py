@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import mlnlite as ml
+from mlnlite.infer import marginal
+from mlnlite.infer.parts import divide
 
 TEXT = """Smokes(p)
 Friends(p, p)
@@ -76,3 +78,20 @@ def test_arviz_of_both_generations(monkeypatch, sampled, version):
 def test_nothing_sampled_nothing_exported(asked):
     with pytest.raises(ml.QueryMistake, match="nothing was sampled"):
         ml.marginal(*asked, "Smokes").to_inference_data()
+
+
+def test_of_isomorphic_components_one_is_sampled(monkeypatch):
+    """Three circles of friends, two of them the same but for their names and the order of these."""
+    model = ml.model_from_text("S(p)\nF(p, p)\n1.1 F(x, y) => (S(x) <=> S(y))\n0.5 S(x)\n")
+    ring = "F({0}, {1})\nF({1}, {2})\nF({2}, {3})\nF({3}, {0})\nF({0}, {2})\n"
+    facts = (
+        ring.format("A", "B", "C", "D") + ring.format("Z", "X", "Y", "W") + ring.format("E", "G", "H", "I") + "S(E)\n"
+    )
+    evidence = ml.evidence_from_text(facts, model=model)
+    exact = ml.marginal(model, evidence, "S", closed_world="F")
+    monkeypatch.setattr(marginal, "divide", lambda p: divide(p, 1))
+    result = ml.marginal(model, evidence, "S", closed_world="F", width_limit=4, precision=0.01)
+    assert result.methods.count("Gibbs sampling") == 8
+    twins = [(result["S(A)"], result["S(Z)"]), (result["S(B)"], result["S(X)"]), (result["S(C)"], result["S(Y)"])]
+    assert all(a == b or {a, b} == {result["S(A)"], result["S(C)"]} for a, b in twins)
+    assert (np.abs(result.probabilities - exact.probabilities) < 5 * result.error + 1e-9).all()

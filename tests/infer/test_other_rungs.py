@@ -77,6 +77,14 @@ def test_what_is_mostly_hard_and_wide_is_counted(monkeypatch):
 
 
 @counter
+def test_weights_too_small_for_the_counter_are_no_contradiction():
+    net = network([("", 1)] * 2, [([([1, 2], 0, 1)], False), ([([1], 1, 1)], True)], weights=[-900.0, 0.5])
+    (part,) = parts.parts(divide(potentials_of(net), 1), np.ones(1, bool))
+    found = wmc.count_models(part, np.ones(2, bool), Deadline())
+    assert found.log_z + potentials_of(net).constant == pytest.approx(marginals_of(net).log_z)
+
+
+@counter
 def test_model_counting_stops():
     part = next(parts.parts(divide(potentials_of(latin(7))), np.ones(1, bool)))
     assert wmc.count_models(part, np.ones(len(part.variables), bool), in_seconds(0.1)) is None
