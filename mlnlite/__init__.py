@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from mlnlite.infer.session import Session as Session
     from mlnlite.infer.session import compile as compile
     from mlnlite.learn.advice import advice as advice
+    from mlnlite.learn.content import with_shared_constants as with_shared_constants
     from mlnlite.learn.crossvalidate import CrossValidation as CrossValidation
     from mlnlite.learn.crossvalidate import Split as Split
     from mlnlite.learn.crossvalidate import Training as Training
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
     from mlnlite.learn.evaluate import Evaluation as Evaluation
     from mlnlite.learn.evaluate import evaluate as evaluate
     from mlnlite.learn.learned import LearnedModel as LearnedModel
+    from mlnlite.learn.path import LaplacePath as LaplacePath
+    from mlnlite.learn.path import laplace_path as laplace_path
     from mlnlite.learn.prior import Cauchy as Cauchy
     from mlnlite.learn.prior import Gaussian as Gaussian
     from mlnlite.learn.prior import Hierarchical as Hierarchical
@@ -85,6 +88,9 @@ _HOMES = {
     "crossvalidate": "mlnlite.learn.crossvalidate",
     "effects": "mlnlite.learn.effects",
     "held_out": "mlnlite.learn.effects",
+    "with_shared_constants": "mlnlite.learn.content",
+    "LaplacePath": "mlnlite.learn.path",
+    "laplace_path": "mlnlite.learn.path",
     "Cauchy": "mlnlite.learn.prior",
     "Gaussian": "mlnlite.learn.prior",
     "Hierarchical": "mlnlite.learn.prior",

@@ -26,6 +26,7 @@ class _Options(TypedDict):
     open_predicates: tuple[str, ...]
     prior_sd: float | None
     prior: str
+    prior_of: tuple[str, ...]
     query: tuple[str, ...]
     given: tuple[str, ...]
     by: Literal["database", "cluster"]
@@ -84,7 +85,7 @@ def crossvalidate(**options: Unpack[_Options]) -> None:
         raise click.UsageError("--hold-out and --hold-out-constants exclude each other")
     by: By = "key" if key else "constant" if types else options["by"]
     split = ml.Split(by, tuple(key or types), options["folds"], options["repeats"], options["seed"])
-    prior = prior_of(options["prior"], options["prior_sd"])
+    prior = prior_of(options["prior"], options["prior_sd"], options["prior_of"])
     training = ml.Training(options["objective"], tuple(names(options["open_predicates"])), prior)
     with working("reading"):
         model = ml.read_model(*models, dialect=options["dialect"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +9,10 @@ from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
 import click
 
-from mlnlite import __version__
 from mlnlite.cli.files import write_whole
+from mlnlite.cli.header import header
 from mlnlite.cli.learning import learning_options, prior_of, split_files
-from mlnlite.cli.options import dialect_option, format_option, names, output_option, time_limit_option
+from mlnlite.cli.options import FILE, dialect_option, format_option, names, output_option, time_limit_option
 from mlnlite.cli.terminal import working
 
 if TYPE_CHECKING:
@@ -29,11 +28,18 @@ class _Options(TypedDict):
     model: tuple[Path, ...]
     database: tuple[Path, ...]
     output: Path | None
-    objective: Objective
+    objective: Objective | None
     open_predicates: tuple[str, ...]
     prior_sd: float | None
     prior: str
+    prior_of: tuple[str, ...]
     predict: tuple[str, ...]
+    tie: tuple[str, ...]
+    times: tuple[str, ...]
+    shared_constants: bool
+    resume: bool
+    held_out: Path | None
+    laplace_path: Path | None
     structure: bool
     report: Literal["sandwich", "information", "bootstrap"] | None
     seed: int
@@ -56,6 +62,19 @@ class _Inputs:
     multiple=True,
     metavar="NAMES",
     help="Predicates to predict from the others (conditional likelihoods). By default all.",
+)
+@click.option(
+    "--tie", multiple=True, metavar="FORMULAS", help="Formulas that have the same weight: `formula 1; formula 3`."
+)
+@click.option("--times", multiple=True, metavar="FILE=N", help="The databases of a file count N times.")
+@click.option("--shared-constants", is_flag=True, help="Each database has the constants of all.")
+@click.option("--resume", is_flag=True, help="Start with the weights that the model has, such as a learnt one.")
+@click.option("--held-out", type=FILE, metavar="FILE", help="Also say how probable these databases are.")
+@click.option(
+    "--laplace-path",
+    type=FILE,
+    metavar="FILE",
+    help="Also write a table (CSV) of the weights under Laplace priors of all scales.",
 )
 @click.option(
     "--structure",
@@ -82,27 +101,34 @@ def learn(**options: Unpack[_Options]) -> None:
     and the summary to standard error.
     """
     inputs = _Inputs(*split_files(options["files"], options["model"], options["database"]))
-    learned, report = _learned(inputs, options)
-    text = _header(learned, inputs, options) + learned_text(learned)
+    learned, report, unseen = _learned(inputs, options)
+    text = header(learned, inputs.models, inputs.databases, options["seed"]) + learned_text(learned)
+    if options["laplace_path"] is not None:
+        _write_path(learned, options["laplace_path"])
     output = options["output"]
     if output is not None:
         write_whole(output, text)
     if options["format"] == "json":
         where = {"model": text} if output is None else {"output": str(output)}
-        more = {} if report is None else {"report": report.to_dict()}
+        more: dict[str, object] = {} if report is None else {"report": report.to_dict()}
+        more |= {} if unseen is None else {"held_out": unseen}
         click.echo(json.dumps({**learned.to_dict(), **more, **where}, indent=2))
         return
     summary = str(learned) if report is None else f"{learned}\n\n{report}\n"
+    summary += "" if unseen is None else f"\n{'held-out pseudo-log-likelihood':<36}{unseen:.6f} per atom or block"
     click.echo(summary, err=output is None)
     click.echo(text if output is None else f"{'written to':<36}{output}", nl=output is not None)
 
 
-def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report | None]:
+def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report | None, float | None]:
+    """What was learnt, the report on it, and how probable other databases are."""
     import mlnlite as ml
 
     with working("reading"):
         model = ml.read_model(*inputs.models, dialect=options["dialect"])
         databases = ml.read_evidence(*inputs.databases, model=model)
+    if options["shared_constants"]:
+        databases = ml.with_shared_constants(databases)
     if options["structure"]:
         model = _with_rules(model, databases, names(options["predict"]), options["seed"])
     with working("learning"):
@@ -112,16 +138,49 @@ def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report |
             objective=options["objective"],
             predict=names(options["predict"]) or None,
             open_predicates=names(options["open_predicates"]),
-            prior=prior_of(options["prior"], options["prior_sd"]),
+            prior=prior_of(options["prior"], options["prior_sd"], options["prior_of"]),
+            tied=[[name.strip() for name in group.split(";")] for group in options["tie"]],
+            database_weights=_database_weights(databases, options["times"]),
+            resume=options["resume"],
+            seed=options["seed"],
             time_limit=options["time_limit"],
         )
-    method = options["report"]
+    method, held = options["report"], options["held_out"]
+    unseen = None if held is None else ml.held_out(learned, ml.read_evidence(held, model=learned.model))
     if method is None:
-        return learned, None
+        return learned, None, unseen
     from mlnlite.learn.report import report
 
     with working("measuring"):
-        return learned, report(learned, databases, method=method, seed=options["seed"])
+        return learned, report(learned, databases, method=method, seed=options["seed"]), unseen
+
+
+def _database_weights(databases: Evidence, times: tuple[str, ...]) -> list[float] | None:
+    """How often each database counts; a database is named `file#3`."""
+    if not times:
+        return None
+    found = dict.fromkeys((name.rpartition("#")[0] for name in databases.names), 1.0)
+    for one in times:
+        file, _, number = one.rpartition("=")
+        match = [name for name in found if file in (name, Path(name).name)]
+        if not match or not number.replace(".", "", 1).isdigit():
+            raise click.UsageError(f"--times takes FILE=N with one of the database files and a number, found {one}")
+        found |= dict.fromkeys(match, float(number))
+    return [found[name.rpartition("#")[0]] for name in databases.names]
+
+
+def _write_path(learned: LearnedModel, file: Path) -> None:
+    """The weights under Laplace priors of all scales, a line for each scale and weight that is not 0."""
+    import mlnlite as ml
+
+    path = ml.laplace_path(learned)
+    rows = [
+        f'{scale:.6g},{weight:.6f},"{formula.replace(chr(34), chr(34) * 2)}"'
+        for scale, weights in zip(path.scales.tolist(), path.weights.tolist(), strict=True)
+        for weight, formula in zip(weights, path.formulas, strict=True)
+        if weight
+    ]
+    write_whole(file, "\n".join(["scale,weight,formula", *rows]) + "\n")
 
 
 def _with_rules(model: Model, databases: Evidence, predict: list[str], seed: int) -> Model:
@@ -143,37 +202,3 @@ def learned_text(learned: LearnedModel) -> str:
 
     with working("writing"):
         return ml.model_text(learned.model).rstrip("\n") + "\n"
-
-
-def _header(learned: LearnedModel, inputs: _Inputs, options: _Options) -> str:
-    """How the weights came about, as comments: for people, then as JSON."""
-    from mlnlite.learn.prior import prior_data, prior_text
-
-    data = {
-        "mlnlite": __version__,
-        "objective": learned.objective,
-        "value": learned.value,
-        "prior": prior_data(learned.prior),
-        "predict": learned.how.predict,
-        "open": learned.how.open_predicates,
-        "status": learned.status,
-        "iterations": learned.iterations,
-        "seed": options["seed"],
-        "models": {path.name: _hash(path) for path in inputs.models},
-        "databases": {path.name: _hash(path) for path in inputs.databases},
-    }
-    lines = [
-        f"learnt by mlnlite {__version__}",
-        f"{learned.objective} {learned.value:.6f}",
-        f"prior: {prior_text(learned.prior)}",
-        f"stopped: {learned.status} after {learned.iterations} steps",
-        *(f"model: {path.name} sha256:{_hash(path)}" for path in inputs.models),
-        *(f"data: {path.name} sha256:{_hash(path)}" for path in inputs.databases),
-        f"json: {json.dumps(data)}",
-    ]
-    return "".join(f"// {line}\n" for line in lines) + "\n"
-
-
-def _hash(path: Path) -> str:
-    """Content of an input file: its SHA-256."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()

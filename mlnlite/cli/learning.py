@@ -11,9 +11,10 @@ from mlnlite.cli.options import FILE, Command
 from mlnlite.errors import MlnError
 
 if TYPE_CHECKING:
-    from mlnlite.learn.prior import Prior
+    from mlnlite.learn.prior import OnePrior, Prior
 
 DEFAULT_SD = 5.0
+FAMILIES = ("gaussian", "laplace", "cauchy", "hierarchical", "none")
 
 
 def learning_options(command: Command) -> Command:
@@ -43,7 +44,7 @@ _OPTIONS = (
     ),
     click.option(
         "--prior",
-        type=click.Choice(["gaussian", "laplace", "cauchy", "hierarchical", "none"]),
+        type=click.Choice(FAMILIES),
         default="gaussian",
         show_default=True,
         help="`laplace`: exact zeros; `hierarchical`: rows of a `+` template share a learnt mean and spread; `none`: "
@@ -55,11 +56,36 @@ _OPTIONS = (
         metavar="S",
         help="Standard deviation, or scale, of the prior (mean 0). By default 5; Laplace 1, Cauchy 2.5.",
     ),
+    click.option(
+        "--prior-of",
+        multiple=True,
+        metavar="'FORMULA: PRIOR'",
+        help="Another prior for one formula: family, scale, for `gaussian` a mean: `formula 2: gaussian 1 0.5`.",
+    ),
 )
 
 
-def prior_of(family: str, sd: float | None) -> Prior | None:
+def prior_of(family: str, sd: float | None, single: tuple[str, ...] = ()) -> Prior | None:
     """The prior that the options mean."""
+    if not single:
+        return _prior(family, sd)
+    found = {"*": _prior(family, sd)}
+    for one in single:
+        formula, _, text = one.rpartition(":")
+        words = text.split()
+        try:
+            numbers = [float(word) for word in words[1:]]
+        except ValueError:
+            words = []
+        known = words and words[0] in FAMILIES and (len(words) <= 2 or (words[0] == "gaussian" and len(words) == 3))
+        if not known or not formula:
+            raise click.UsageError(f"--prior-of takes `FORMULA: {'|'.join(FAMILIES)} [SCALE [MEAN]]`, found {one}")
+        found[formula.strip()] = _prior(words[0], numbers[0] if numbers else None, *numbers[1:])
+    return found
+
+
+def _prior(family: str, sd: float | None, mean: float = 0.0) -> OnePrior | None:
+    """One prior."""
     from mlnlite.learn.prior import Cauchy, Gaussian, Hierarchical, Laplace
 
     if family == "none":
@@ -70,7 +96,7 @@ def prior_of(family: str, sd: float | None) -> Prior | None:
         return Laplace(sd or 1.0)
     if family == "cauchy":
         return Cauchy(sd or 2.5)
-    return Hierarchical(sd or DEFAULT_SD) if family == "hierarchical" else Gaussian(sd or DEFAULT_SD)
+    return Hierarchical(sd or DEFAULT_SD) if family == "hierarchical" else Gaussian(sd or DEFAULT_SD, mean)
 
 
 def split_files(

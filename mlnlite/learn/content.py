@@ -1,8 +1,9 @@
-"""What a database says, as a key: equal databases are worked on once."""
+"""What a database says, as a key: equal databases are worked on once. And which constants databases have."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,3 +17,8 @@ def content(evidence: Evidence, predicates: Iterable[str]) -> tuple[bytes, ...]:
         facts = evidence.facts[name]
         parts += [facts.arguments.tobytes(), facts.truth.tobytes()]
     return tuple(parts)
+
+
+def with_shared_constants(evidence: Evidence) -> Evidence:
+    """The same databases, each with the constants of all: what one does not mention is false or unknown there, too."""
+    return replace(evidence, present={name: np.ones_like(p) for name, p in evidence.present.items()})
