@@ -20,6 +20,8 @@ class Diagnostic:
         span: where, if it is in a text.
         hint: what to do about it, or empty.
         severity: errors stop, warnings do not.
+        found: what stands there; by default the text of the span, its first line.
+        expected: what could stand there instead, or empty.
     """
 
     code: str
@@ -27,6 +29,13 @@ class Diagnostic:
     span: Span | None = None
     hint: str = ""
     severity: Literal["error", "warning"] = "error"
+    found: str = ""
+    expected: str = ""
+
+    def __post_init__(self) -> None:
+        """Looks up what stands at the place."""
+        if not self.found and self.span:
+            object.__setattr__(self, "found", self.span.text.split("\n", 1)[0])
 
     def __str__(self) -> str:
         """The message as a person reads it: place, sentence, excerpt with caret, hint."""
@@ -41,7 +50,8 @@ class Diagnostic:
     def to_dict(self) -> dict[str, object]:
         """Plain data for `--format json`."""
         where = {"file": self.span.source.name, "line": self.span.line, "column": self.span.column} if self.span else {}
-        return {"code": self.code, "severity": self.severity, "message": self.message, "hint": self.hint, **where}
+        record = {"code": self.code, "severity": self.severity, "message": self.message}
+        return record | {"found": self.found, "expected": self.expected, "hint": self.hint} | where
 
 
 class MlnError(Exception):

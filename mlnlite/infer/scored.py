@@ -149,7 +149,7 @@ def _together(evidence: Evidence, world: Evidence) -> Evidence:
             unknown = [c for c in t.constants if c not in evidence.types[name].index]
             hint = "the world may only use constants of the model and the evidence; read it after them"
             message = f"the world has other constants of the type {name}: {', '.join(unknown[:5]) or 'another order'}"
-            raise EvidenceMistake([Diagnostic("E330", message, hint=hint)])
+            raise EvidenceMistake([Diagnostic("E322", message, hint=hint)])
     for name, table in evidence.facts.items():
         of_world = world.facts[name]
         rows = np.concatenate([table.arguments, of_world.arguments])
@@ -161,6 +161,6 @@ def _together(evidence: Evidence, world: Evidence) -> Evidence:
         if (again[1:] & (truth[1:] != truth[:-1])).any():
             i = int(np.flatnonzero(again[1:] & (truth[1:] != truth[:-1]))[0])
             atom = evidence.atom_text(int(evidence.atom_number(name, rows[i : i + 1])[0]))
-            raise EvidenceMistake([Diagnostic("E331", f"the world contradicts the evidence about {atom}")])
+            raise EvidenceMistake([Diagnostic("E323", f"the world contradicts the evidence about {atom}")])
         facts[name] = Facts(np.zeros(int((~again).sum()), np.int32), rows[~again], truth[~again])
     return replace(evidence, facts=facts)

@@ -118,7 +118,9 @@ def _check_predicate(statement: tree.PredicateDeclaration, state: _Check) -> Non
     if earlier != predicate:
         place = f" at {earlier.span.place}" if earlier.span else ""
         message = f"{statement.name} is declared again in another way: {predicate}"
-        state.mistakes.append(Diagnostic("E201", message, statement.span, f"it was declared as {earlier}{place}"))
+        state.mistakes.append(
+            Diagnostic("E201", message, statement.span, f"it was declared as {earlier}{place}", expected=str(earlier))
+        )
 
 
 # --- formulas

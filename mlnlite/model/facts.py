@@ -171,7 +171,7 @@ def _read_file(program: EvidenceProgram | TableFacts, first: int, reading: _Read
         if declaration.name not in reading.types:
             hint = did_you_mean(declaration.name, list(reading.types))
             message = f"no predicate uses the type {declaration.name}"
-            reading.mistakes.append(Diagnostic("E301", message, declaration.span, hint))
+            reading.mistakes.append(Diagnostic("E301", message, declaration.span, hint, expected="a type of the model"))
             continue
         ids = reading.ids(declaration.name, [c.name for c in declaration.constants])
         reading.declared.append((first, first + program.n_databases, declaration.name, ids.tolist()))
@@ -224,8 +224,11 @@ def _mention(program: TableFacts, first: int, reading: _Reading) -> None:
 
 def _each(table: FactTable, code: str, message: str, hint: str, reading: _Reading) -> None:
     """The same mistake for every fact of a table."""
+    declared = reading.predicates.get(table.predicate)
+    expected = str(declared) if declared and not declared.comparison else "a predicate of the model"
     for offset in table.offset[:MOST_MISTAKES].tolist():
-        reading.mistakes.append(Diagnostic(code, message, _fact_span(table.source, offset), hint))
+        span = _fact_span(table.source, offset)
+        reading.mistakes.append(Diagnostic(code, message, span, hint, expected=expected))
     more = len(table.offset) - MOST_MISTAKES
     if more > 0:
         reading.mistakes.append(Diagnostic(code, f"{message} ({more} more facts)"))

@@ -39,20 +39,23 @@ def _spellings(model: Model, program: tree.Program) -> Iterator[Diagnostic]:
             yield _warning("W205", message, predicate.span, "use one spelling")
 
 
-def formulas(program: tree.Program) -> Iterator[tuple[tree.Formula, Span | None]]:
+def formulas(program: tree.Program) -> Iterator[tree.FormulaStatement | tree.FormulaTable]:
     """All formulas of a program, those of included files too."""
     for statement in program.statements:
         if isinstance(statement, tree.FormulaStatement | tree.FormulaTable):
-            yield statement.formula, statement.span
+            yield statement
         elif isinstance(statement, tree.Include):
             yield from formulas(statement.program)
 
 
 def _once(model: Model, program: tree.Program) -> Iterator[Diagnostic]:
     """Variables that stand once in a formula of several atoms: often a slip, or a constant in lower case."""
-    for formula, span in formulas(program):
+    for statement in formulas(program):
+        formula, span = statement.formula, statement.span
         variables = variables_of(formula)
-        counts = Counter(v.name for v in variables)
+        counts = Counter(v.name for v in variables) + Counter(_bound(formula))
+        if isinstance(statement, tree.FormulaStatement) and isinstance(statement.weight, tree.NumberOf):
+            counts[statement.weight.variable] += 1
         if len(counts) < 2:
             continue
         for variable in variables:
@@ -68,6 +71,14 @@ def _once(model: Model, program: tree.Program) -> Iterator[Diagnostic]:
                     f"every constant of its type makes a grounding; write EXIST {variable.name} (...) if one is enough"
                 )
                 yield _warning("W206", message, variable.span or span, hint)
+
+
+def _bound(formula: tree.Formula) -> Iterator[str]:
+    """The variables that quantifiers and counts of a formula bind."""
+    if isinstance(formula, tree.Quantified | tree.Count):
+        yield from formula.variables
+    for part in parts(formula):
+        yield from _bound(part)
 
 
 def _constant(model: Model, program: tree.Program) -> Iterator[Diagnostic]:
@@ -112,12 +123,12 @@ def _one_constant(model: Model, program: tree.Program) -> Iterator[Diagnostic]:
 
 def _mixed(model: Model, program: tree.Program) -> Iterator[Diagnostic]:
     """`^` and `v` side by side without parentheses, which dialects read in two ways."""
-    for formula, span in formulas(program):
-        if program.origin and program.origin.dialect in ("standard", "prac") and _mixes(formula):
+    for statement in formulas(program):
+        if program.origin and program.origin.dialect in ("standard", "prac") and _mixes(statement.formula):
             text = "`a ^ (b v c)` here, `(a ^ b) v c` in Alchemy and prac"
             if program.dialect == "prac":
                 text = "`(a ^ b) v c` here, `a ^ (b v c)` in the standard dialect"
-            yield _warning("W211", f"`a ^ b v c` without parentheses is {text}", span, "put parentheses")
+            yield _warning("W211", f"`a ^ b v c` without parentheses is {text}", statement.span, "put parentheses")
 
 
 def _mixes(formula: tree.Formula) -> bool:

@@ -151,7 +151,9 @@ def _special(role: str, table: Table, names: Sequence[str], where: str) -> str |
 def _verify_column(column: str, names: Sequence[str], where: str) -> None:
     if column not in names:
         hint = did_you_mean(column, names) or f"it has {', '.join(names)}"
-        raise EvidenceMistake([Diagnostic("E333", f"{where} has no column {column}", hint=hint)])
+        raise EvidenceMistake(
+            [Diagnostic("E333", f"{where} has no column {column}", hint=hint, found=column, expected=", ".join(names))]
+        )
 
 
 def _arguments(predicate: Predicate, table: Table, names: Sequence[str], special: set[str], where: str) -> list[str]:

@@ -111,7 +111,7 @@ class FormulaTyper:
         for constant in comparison_constants(formula):
             if number_of(constant.name) is None:
                 hint = "constants are compared as numbers; `=` compares any"
-                self._mistake("E210", f"{constant.name} is no number", constant.span or formula.span, hint)
+                self._mistake("E210", f"{constant.name} is no number", constant.span or formula.span, hint, "a number")
         indices = tuple(dict.fromkeys(self._variable(v) for v in comparison_variables(formula)))
         if not indices:
             return lambda: typed.All(()) if bool(holds(formula, ())) else typed.Any(())
@@ -154,11 +154,11 @@ class FormulaTyper:
             hint = did_you_mean(atom.predicate, list(self.predicates)) or (
                 f"declare it: {atom.predicate}({', '.join('type' for _ in atom.arguments)})"
             )
-            self._mistake("E202", f"the predicate {atom.predicate} is not declared", atom.span, hint)
+            self._mistake("E202", f"the predicate {atom.predicate} is not declared", atom.span, hint, "a predicate")
         elif len(atom.arguments) != predicate.arity:
             found = f"{len(atom.arguments)} argument{'s' * (len(atom.arguments) != 1)}"
             message = f"{predicate.name} takes {predicate.arity}, found {found}"
-            self._mistake("E203", message, atom.span, f"it is declared as {predicate}")
+            self._mistake("E203", message, atom.span, f"it is declared as {predicate}", str(predicate))
             predicate = None
         if predicate is None:
             for term in atom.arguments:
@@ -213,7 +213,9 @@ class FormulaTyper:
             if term.name in scope:
                 index = scope[term.name]
                 if term.plus and scope is not self._scopes[0]:
-                    self._mistake("E208", f"+{term.name} is bound by a quantifier", term.span, "remove the plus sign")
+                    self._mistake(
+                        "E208", f"+{term.name} is bound by a quantifier", term.span, "remove the plus sign", term.name
+                    )
                 self.variables[index].plus |= term.plus and scope is self._scopes[0]
                 return index
         index = self._scopes[0][term.name] = self._new(_Variable(term.name, plus=term.plus, span=term.span))
@@ -231,7 +233,7 @@ class FormulaTyper:
             message = (
                 f"the variable {variable.name} is a {variable.type} elsewhere in this formula and a {type_name} here"
             )
-            self._mistake("E204", message, span, "a variable has one type; use two variables")
+            self._mistake("E204", message, span, "a variable has one type; use two variables", f"a {type_name}")
 
     def _spread_types(self) -> None:
         """Gives variables that stand only in equalities the type of the other side."""
@@ -251,8 +253,8 @@ class FormulaTyper:
             message = f"the variable {variable.name} stands in no atom, so its type is unknown"
         self._mistake("E205", message, variable.span, "use it in an atom, or remove it")
 
-    def _mistake(self, code: str, message: str, span: Span | None, hint: str = "") -> None:
-        diagnostic = Diagnostic(code, message, span, hint)
+    def _mistake(self, code: str, message: str, span: Span | None, hint: str = "", expected: str = "") -> None:
+        diagnostic = Diagnostic(code, message, span, hint, expected=expected)
         if diagnostic not in self.mistakes:
             self.mistakes.append(diagnostic)
 

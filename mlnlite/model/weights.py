@@ -106,13 +106,15 @@ def checked_weight(weight: WeightExpression, span: Span | None, mistakes: list[D
     try:
         value = evaluate(weight)
     except ZeroDivisionError:
-        mistakes.append(Diagnostic("E220", "this weight has no value: it divides by zero", span))
+        mistakes.append(
+            Diagnostic("E220", "this weight has no value: it divides by zero", span, expected="a finite number")
+        )
         return 0.0
     except (ValueError, OverflowError) as error:
-        mistakes.append(Diagnostic("E220", f"this weight has no value: {error}", span))
+        mistakes.append(Diagnostic("E220", f"this weight has no value: {error}", span, expected="a finite number"))
         return 0.0
     if math.isnan(value) or value == -math.inf:
         hint = "a formula that must never hold is written as its negation with a final dot"
-        mistakes.append(Diagnostic("E221", f"a weight cannot be {value}", span, hint))
+        mistakes.append(Diagnostic("E221", f"a weight cannot be {value}", span, hint, expected="a finite number"))
         return 0.0
     return value

@@ -66,6 +66,37 @@ MESSAGES: dict[str, str] = {
 }
 
 
+EXPECTED: dict[str, str] = {
+    "E105": "one of ! ^ v => <=>",
+    "E106": "parentheses",
+    "E108": "a blank",
+    "E109": "the end of the line",
+    "E111": "one of #unique #fixweight #include #group",
+    "E113": "*/",
+    "E114": 'a closing "',
+    "E119": "different names",
+    "E121": "a formula",
+    "E122": "one of log logx ln log2 log10 logit exp sqrt",
+    "E124": "letters, digits and _",
+    "E125": "a variable",
+    "E127": "variables",
+    "E128": '"',
+    "E129": "a number between 0 and 1",
+    "E141": "the end of the line",
+    "E142": "the end of the line",
+    "E143": "the end of the line",
+    "E145": "? or !",
+    "E146": "a constant",
+    "E147": "---",
+    "E148": "a number from 0 to 1",
+    "E150": "a predicate, an atom or a formula",
+    "E151": "two whole numbers",
+    "E153": "a macro that is defined above",
+}
+"""What could stand in the place of a mistake, for codes whose sentence does not say it."""
+
+
 def mistake(code: str, span: Span | None, hint: str = "", **words: object) -> Diagnostic:
     """The diagnostic of `code` with `words` filled into its sentence."""
-    return Diagnostic(code, MESSAGES[code].format(**words), span, hint)
+    found, expected = str(words.get("found", "")), str(words.get("expected", EXPECTED.get(code, "")))
+    return Diagnostic(code, MESSAGES[code].format(**words), span, hint, found=found.strip("`"), expected=expected)
