@@ -14,7 +14,12 @@ from mlnlite.syntax.place import Place
 
 _SUMS = {"succ": "+", "plus": "+", "minus": "-", "times": "*", "dividedBy": "/", "mod": "%"}
 _ORDERS = {"greaterThan": ">", "lessThan": "<", "greaterThanEq": ">=", "lessThanEq": "<="}
-_TEXT_FUNCTIONS = ("concat", "substr", "lower", "upper", "length", "contains", "startsWith", "endsWith", "trim", "md5")
+# fmt: off
+_TEXT_FUNCTIONS = (
+    "concat", "substr", "lower", "upper", "length", "contains", "startsWith", "endsWith", "trim", "initcap", "md5",
+    "strpos", "repeat", "replace", "split_part", "regex_replace",
+)
+# fmt: on
 
 
 def _term(place: Place, span: Span, children: Children) -> tree.Variable | tree.Constant:
@@ -38,22 +43,30 @@ def variable_name(word: str) -> str:
 
 
 def _successor(place: Place, span: Span, children: Children) -> tree.Operation:
-    return tree.Operation("+", _term(place, span, children[:1]), tree.Constant("1", span), span)
+    return tree.Operation(children[1][0], _term(place, span, children[:1]), tree.Constant("1", span), span)
 
 
 def _apply(place: Place, span: Span, children: Children) -> tree.Operation | raw.Apply:
     name, arguments = str(children[0]), tuple(c for c in children if not isinstance(c, str))
-    if name in _TEXT_FUNCTIONS:
-        hint = "make the text beforehand, and give it as a constant or as facts of a predicate"
-        raise SyntaxMistake([mistake("E110", span, hint, construct=f"`{name}(...)`, a function of texts,")])
+    _refuse_text_function(name, span)
     if name in _SUMS and len(arguments) == (1 if name == "succ" else 2):
         right = arguments[1] if len(arguments) > 1 else tree.Constant("1", span)
         return tree.Operation(_SUMS[name], arguments[0], right, span)
+    if place.language in ("tuffy", "rockit"):
+        hint = "compute its values beforehand, and give them as facts of a predicate"
+        raise SyntaxMistake([mistake("E110", span, hint, construct=f"`{name}(...)`, a function,")])
     return raw.Apply(name, arguments, span)
+
+
+def _refuse_text_function(name: str, span: Span) -> None:
+    if name in _TEXT_FUNCTIONS:
+        hint = "make the text beforehand, and give it as a constant or as facts of a predicate"
+        raise SyntaxMistake([mistake("E110", span, hint, construct=f"`{name}(...)`, a function of texts,")])
 
 
 def _atom(place: Place, span: Span, children: Children) -> tree.Atom | tree.Comparison:
     name, terms = str(children[0]), tuple(c for c in children if not isinstance(c, str))
+    _refuse_text_function(name, span)
     if name in _ORDERS and len(terms) == 2:
         return tree.Comparison(_ORDERS[name], terms[0], terms[1], span)
     return tree.Atom(name, terms, span)
@@ -108,7 +121,9 @@ def _rule(place: Place, span: Span, children: Children) -> raw.Rule:
 
 
 def _foreign_weight(place: Place, span: Span, children: Children) -> Weight:
-    return Weight(children[-1], len(children) > 1, span)
+    """A weight is fixed by `@`, in Alchemy by a dot right behind it."""
+    dotted = place.language == "alchemy" and span.text.endswith(".")
+    return Weight(children[-1], len(children) > 1 or dotted, span)
 
 
 def _function(place: Place, span: Span, children: Children) -> raw.Function:

@@ -71,11 +71,13 @@ def read_directive(text: str, place: Place, pending: Pending) -> Pending:
             if not re.fullmatch(r'#include\s*(?:"[^"]+"|<[^>]+>)', text):
                 raise _malformed(span, word, "needs the name of a file", 'write `#include "file.mln"`')
             return pending
-        case "#group":
+        case "#group" | "#AdaptiveMLNDependency":
             return pending
         case "#fuzzy":
             hint = "remove the line: an atom of the predicate is then either true or false"
             raise SyntaxMistake([mistake("E110", mark, hint, construct="`#fuzzy` (a predicate with graded truth)")])
+    if ":-" in text:
+        raise SyntaxMistake([mistake("E110", mark, "drop the `#`", construct="a passing predicate (`#P(...) :-`)")])
     if text[1:2].isspace() or text == "#":
         raise SyntaxMistake([mistake("E111", mark, "a comment starts with `//`", found=word)])
     hint = did_you_mean(word, _KNOWN) or f"known are {', '.join(_KNOWN[:-1])}; a comment starts with `//`"

@@ -63,6 +63,9 @@ def _included(path: str, span: Span, chain: tuple[str, ...]) -> tuple[File | Non
         return None, [mistake("E138", span, "one of these files has to do without the other", chain=names)]
     if len(chain) >= MAX_INCLUDES:
         return None, [mistake("E139", span, "put the statements into fewer files", limit=MAX_INCLUDES)]
+    if target.suffix in (".cpp", ".jar"):
+        hint = "give the values that it computes as facts of a predicate"
+        return None, [mistake("E110", span, hint, construct=f"an include of program code (`{path}`)")]
     if not target.exists():
         hint = similar_file(target) or "the path is taken relative to the including file"
         return None, [mistake("E137", span, hint, path=path)]

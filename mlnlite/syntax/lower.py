@@ -107,7 +107,7 @@ class _Lifting:
 
 def without_functions(formula: Any, *, hard: bool) -> tree.Formula:  # noqa: ANN401
     """The formula with variables and conditions in place of values of functions and of arithmetic."""
-    lifting = _Lifting(set(_names(formula)))
+    lifting = _Lifting(set(names_of(formula)))
     inside: tree.Formula = _lifted(formula, lifting)
     conditions = tuple(c for _, c in lifting.conditions)
     if not conditions:
@@ -167,7 +167,7 @@ def _lifted_quantifier(formula: Any, lifting: _Lifting) -> Any:  # noqa: ANN401
     body = _lifted(formula.body, lifting)
     bound, mine = set(formula.variables), []
     for name, condition in lifting.conditions:
-        if bound & set(_names(condition)):
+        if bound & set(names_of(condition)):
             bound.add(name)
             mine.append((name, condition))
         else:
@@ -186,22 +186,36 @@ def _lifted_quantifier(formula: Any, lifting: _Lifting) -> Any:  # noqa: ANN401
     return replace(formula, variables=variables, body=tree.Implies(all_of, body, formula.span))
 
 
-def _names(node: Any) -> Iterator[str]:  # noqa: ANN401
+def predicates_of(formula: Any) -> Iterator[str]:  # noqa: ANN401
+    """The predicates of a formula with raw nodes."""
+    match formula:
+        case tree.Atom(predicate):
+            yield predicate
+        case raw.Both(atom):
+            yield atom.predicate
+        case raw.Group(predicates):
+            yield from predicates
+        case _:
+            for part in parts(formula):
+                yield from predicates_of(part)
+
+
+def names_of(node: Any) -> Iterator[str]:  # noqa: ANN401
     """The variables of a formula or a term, raw ones included."""
     match node:
         case tree.Variable(name):
             yield name
         case tree.Atom() | raw.Apply() | raw.Group():
             for argument in node.arguments:
-                yield from _names(argument)
+                yield from names_of(argument)
         case raw.Both(atom):
-            yield from _names(atom)
+            yield from names_of(atom)
         case tree.Equality() | tree.Comparison() | tree.Operation():
-            yield from _names(node.left)
-            yield from _names(node.right)
+            yield from names_of(node.left)
+            yield from names_of(node.right)
         case tree.Quantified() | tree.Count():
             yield from node.variables
-            yield from _names(node.body)
+            yield from names_of(node.body)
         case _:
             for part in parts(node):
-                yield from _names(part)
+                yield from names_of(part)

@@ -23,7 +23,7 @@ from mlnlite.syntax.includes import File, load
 from mlnlite.syntax.lines import split_statements
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
-from mlnlite.syntax.programs import Vocabulary, completion, finished, read_test
+from mlnlite.syntax.programs import Vocabulary, completion, finished, read_test, recursive
 from mlnlite.syntax.queries import parse_atom_query, split_queries
 from mlnlite.syntax.statements import read_foreign, read_statement
 from mlnlite.syntax.tables import Gathering, add, can_gather, finish, read_row
@@ -85,7 +85,7 @@ def parse_what_can_be_read(
     if dialect == "standard" and marked:
         return Program((), "standard"), [*reading.mistakes, wrong_dialect(marked)]
     statements = _read_files(files, reading)
-    if reading.dialect == "standard":
+    if reading.dialect not in ("prac", "rockit"):
         reading.mistakes += constants_as_variables(statements)
     span = Span(sources[0], 0, len(sources[0].text)) if sources else None
     origin = Origin(found, reasons, NOTES[found])
@@ -114,6 +114,8 @@ def _read_files(files: Sequence[File], reading: _Reading) -> tuple[tree.Statemen
     for file in files:
         _read_file(file, reading, gathering)
     try:
+        if reading.dialect == "tuffy":
+            reading.mistakes += recursive(reading.vocabulary)
         rules, reading.vocabulary.rules = list(completion(reading.vocabulary)), {}
         gathering.items += rules
     except SyntaxMistake as error:

@@ -7,13 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from mlnlite.errors import SyntaxMistake
+from mlnlite.errors import Diagnostic, SyntaxMistake
 from mlnlite.source import Span
 from mlnlite.syntax import raw, tree
-from mlnlite.syntax.lower import statements_of, without_functions
+from mlnlite.syntax.lower import names_of, predicates_of, statements_of, without_functions
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
-from mlnlite.syntax.walk import terms_of
 
 _TEST = re.compile(
     r"@test\s+(?:given\s+(?P<given>.+?)\s+)?query\s+(?P<query>.+?)\s*=\s*(?P<p>[\d.eE+-]+?)\s*"
@@ -150,12 +149,36 @@ def _plain(head: tree.Atom) -> bool:
 def _case(head: tree.Atom, rule: raw.Rule, names: Sequence[str]) -> tree.Formula:
     """The body of a rule for the arguments `names` of its head; its other variables are bound by EXIST."""
     equal = [
-        tree.Equality(tree.Variable(name), term, rule.span)
+        _equal(tree.Variable(name), term, rule.span)
         for name, term in zip(names, head.arguments, strict=True)
         if not (isinstance(term, tree.Variable) and term.name == name)
     ]
-    body = without_functions(rule.body, hard=False)
-    inside = tree.And((*equal, body), rule.span) if equal else body
-    variables = dict.fromkeys(t.name for t in terms_of(inside) if isinstance(t, tree.Variable))
-    bound = tuple(name for name in variables if name not in names)
+    inside = without_functions(tree.And((*equal, rule.body), rule.span) if equal else rule.body, hard=False)
+    bound = tuple(name for name in dict.fromkeys(names_of(inside)) if name not in names)
     return tree.Quantified("exist", bound, inside, rule.span) if bound else inside
+
+
+def _equal(variable: tree.Variable, term: Any, span: Span) -> tree.Equality | tree.Comparison:  # noqa: ANN401
+    if isinstance(term, tree.Operation):
+        return tree.Comparison("=", variable, term, span)
+    return tree.Equality(variable, term, span)
+
+
+def recursive(vocabulary: Vocabulary) -> Iterator[Diagnostic]:
+    """A mistake for each rule of a predicate that depends on itself."""
+    needs = {
+        name: {p for rule, _ in rules for p in predicates_of(rule.body)} for name, rules in vocabulary.rules.items()
+    }
+    for name, rules in vocabulary.rules.items():
+        reached, waiting = set(), list(needs[name])
+        while waiting:
+            found = waiting.pop()
+            if found not in reached:
+                reached.add(found)
+                waiting += needs.get(found, ())
+        if name in reached:
+            rule, span = next((r, s) for r, s in rules if reached & set(predicates_of(r.body)))
+            hint = (
+                f"work out what it derives beforehand and give it as facts of {name}, or write `body => {name}(...).`"
+            )
+            yield mistake("E110", span or rule.span, hint, construct=f"a recursive rule ({name} depends on itself)")

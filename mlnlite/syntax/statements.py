@@ -49,17 +49,56 @@ _MACRO = re.compile(r"\$\w+\s*=")
 _FUNCTION = re.compile(r"(?!(?i:exists?|forall|not|inf)\b)[^\W\d][\w-]*\s+(?!v\s)[^\W\d][\w-]*\s*\(")
 _COUNT = re.compile(r"\|([\w\s,]+)\|(.+?)(<=|>=|<|>|=)\s*(\d+)\s*\.?")
 _NAMED = re.compile(r"\*{0,2}[^\W\d][\w-]*\s*\(\s*\w+(?:\s+\w+)?\s*[!?]?(?:\s*,\s*\w+(?:\s+\w+)?\s*[!?]?)*\s*\)[*@+]*")
-_REFUSED = (
-    (re.compile(r"(?i:FD)\s*:"), "a functional dependency (`FD:`)", "mark the argument with `!` in the declaration"),
-    (re.compile(r".*:=.*"), "scoping (`:=`)", "write the condition into each formula"),
-    (
-        re.compile(r"[\d.-]+\s*:\s*[\d.-]+\s|:[\d.-]+\s"),
-        "a utility",
-        "utilities of decisions have no counterpart; drop them",
-    ),
-    (re.compile(r".*\)\s*\*\s*\(.*"), "a numeric feature (`(f) * (P(x) = 3.0)`)", "divide the numbers into bins"),
-    (re.compile(r"\[[\w\s=.+]*\].*"), "a label or prior in front of a formula", "drop it; `@` fixes a weight"),
-    (re.compile(r"sum\s*\(.*\)\s*:="), "a computed predicate", "compare the numbers in the formulas: `x + y = z`"),
+_QUOTED = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"')
+_ALL: tuple[tree.Foreign, ...] = ("alchemy", "tuffy", "rockit", "lomrf")
+# Constructs that are not supported: the languages that have them, how they begin, their names, what to do instead.
+_REFUSED: tuple[tuple[tuple[tree.Foreign, ...], re.Pattern[str], str, str], ...] = tuple(
+    (languages, re.compile(pattern), construct, hint)  # type: ignore[misc]
+    for languages, pattern, construct, hint in (
+        (_ALL, r"(?i:FD)\s*:", "a functional dependency (`FD:`)", "mark the argument with `!` in the declaration"),
+        (_ALL, r"\w+\s*\(.*\)\s*:=\s*\[", "a computed predicate (`:= [...]`)", "compare in the formulas: `x + y = z`"),
+        (_ALL, r".*:=", "scoping (`:=`)", "write the condition into each formula"),
+        (
+            _ALL,
+            r"[\d.-]+\s*:\s*[\d.-]+\s|:[\d.-]+\s",
+            "a utility",
+            "utilities of decisions have no counterpart; drop them",
+        ),
+        (
+            _ALL,
+            r".*\)\s*\*\s*\(.*|[-+\d.\s]*\([^()]*\([^()]*\)[^()]*\)\s*\^\s*\d",
+            "a numeric feature (`(f) * (P(x) = 3.0)`)",
+            "divide the numbers into bins",
+        ),
+        (
+            ("alchemy",),
+            r"[-+\d.]*\s*\[.*\]\s*\.?$",
+            "an indivisible formula (`[f]`)",
+            "drop the brackets: no weight is divided",
+        ),
+        (_ALL, r"\[[\w\s=.+]*\].*", "a label or prior in front of a formula", "drop it; `@` fixes a weight"),
+        (("tuffy",), r"\$\w+\s*\(.*:-", "a view (`$P(...) :-`)", "drop the `$`"),
+        (("tuffy",), r"@\s*[^\W\d]\w*\s*\(.*:-", "a rule for afterwards (`@P(...) :-`)", "ask for its body instead"),
+        (
+            ("tuffy",),
+            r".*(?:<<|>>|~|(?<!&)&(?!&)|(?<!\|)\|(?!\|))",
+            "an operation on bits",
+            "make the numbers beforehand, and give them as facts of a predicate",
+        ),
+        (
+            ("tuffy", "rockit"),
+            r"(?!(?i:exists?|forall|not|inf)\b)[^\W\d][\w-]*\s+(?!v\s)[^\W\d][\w-]*\s*\(",
+            "a function (`type f(type)`)",
+            "declare a predicate with exactly one value, `f(type, type!)`, and write `f(x, y) ^ ...`",
+        ),
+        (
+            ("rockit",),
+            r"[-+\d.]+\s*\|",
+            "a weight in front of a count",
+            "counts are hard in RockIt; `1.5 count(f | x) <= 2` is possible in the standard dialect",
+        ),
+        (("rockit",), r"[^\[]*\[", "a computed term (`[t + 1]`)", "write it without brackets: `P(t + 1)`"),
+    )
 )
 
 
@@ -72,8 +111,9 @@ def read_foreign(
         SyntaxMistake: it is no statement of the language, or has no counterpart here.
     """
     refuse_long_chain(text, place)
-    for pattern, construct, hint in _REFUSED:
-        if pattern.match(text):
+    bare = _QUOTED.sub(lambda match: "_" * len(match[0]), text)
+    for languages, pattern, construct, hint in _REFUSED:
+        if dialect in languages and pattern.match(bare):
             raise SyntaxMistake([mistake("E110", place.span(0, len(text)), hint, construct=construct)])
     count = _COUNT.fullmatch(text)
     if count:
