@@ -1,4 +1,4 @@
-"""`mlnlite convert`: a model of any dialect in one of ours, with a list of what changes."""
+"""`mlnlite convert`: a model of any dialect in one of ours, with a list of what changes and where."""
 
 from __future__ import annotations
 
@@ -40,6 +40,6 @@ def convert(
     sources = [read_source(path) for path in models]
     program = parse_model(sources, dialect)
     check(program)
-    for line in losses(program, [source.text for source in sources]):
+    for line in losses(program, sources):
         click.echo(line, err=True)
     emit(write_model(replace(rewritten(program), dialect=to)).rstrip("\n"), output)

@@ -53,7 +53,7 @@ _QUOTED = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"')
 _ALL: tuple[tree.Foreign, ...] = ("alchemy", "tuffy", "rockit", "lomrf")
 # Constructs that are not supported: the languages that have them, how they begin, their names, what to do instead.
 _REFUSED: tuple[tuple[tuple[tree.Foreign, ...], re.Pattern[str], str, str], ...] = tuple(
-    (languages, re.compile(pattern), construct, hint)  # type: ignore[misc]
+    (languages, re.compile(pattern), construct, hint)
     for languages, pattern, construct, hint in (
         (_ALL, r"(?i:FD)\s*:", "a functional dependency (`FD:`)", "mark the argument with `!` in the declaration"),
         (_ALL, r"\w+\s*\(.*\)\s*:=\s*\[", "a computed predicate (`:= [...]`)", "compare in the formulas: `x + y = z`"),

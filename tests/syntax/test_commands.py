@@ -75,10 +75,24 @@ def test_convert(tmp_path):
     code, output = run("convert", path)
     assert code == 0
     assert "read as alchemy" in output
-    assert "not kept: comments" in output
+    assert f"not kept: comments: {path}:3:25" in output
+    assert f"functions are predicates `f(x, y!)`: {path}:1:1" in output
     assert "mother(person, person!)" in output
     code, output = run("convert", "--to", "prac", path, "-o", tmp_path / "p.mln")
     assert run("check", "--dialect", "prac", tmp_path / "p.mln")[0] == 0
+
+
+def test_convert_lists_places(tmp_path):
+    path = tmp_path / "a.mln"
+    rows = "".join(f"$w P({c}) ^ Q\n" for c in "ABCDEFGHIJ")
+    path.write_text("t = {1, ..., 3}\nP(t)\nQ\n$w = 2\n" + rows + "1 *P(x) v Q\np=0.8: Q => P(2)\n")
+    output = run("convert", path)[1]
+    assert f"rewritten: macros are written as their values: {path}:4:1, {path}:5:1, " in output
+    assert "and 3 more" in output
+    assert f"two formulas, with `P(x)` and with `!P(x)`: {path}:15:3\n" in output
+    assert f"written as `logit(p)`: {path}:16:1\n" in output
+    path.write_text("person = {A}\nP(person)\nQ(person)\n1 P(x) <=> Q(x)\n2 P(x) => Q(x)\n")
+    assert f"weights that these systems divide: {path}:4:1\n" in run("convert", "--dialect", "alchemy", path)[1]
 
 
 LINT = {
