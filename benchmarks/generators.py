@@ -24,20 +24,16 @@ Cancer(person)
 
 RIVALS = """*Friends(person, person)
 *Rivals(person, person)
-*Habit(person, level)
+*Stress(person)
+*Sport(person)
 Smokes(person)
-Cancer(person)
-0.9 Friends(x, y) ^ Smokes(x) => Smokes(y)
-1.1 Rivals(x, y) => !(Smokes(x) ^ Smokes(y))
-1.7 Habit(x, A) => Smokes(x)
-0.9 Habit(x, B) => Smokes(x)
-0.4 Habit(x, C) => Smokes(x)
--0.3 Habit(x, D) ^ Smokes(x)
--0.8 Habit(x, E) ^ Smokes(x)
--1.6 Habit(x, F) ^ Smokes(x)
-0.8 Smokes(x) => Cancer(x)
--0.5 Cancer(x)
+1.6 Stress(x) => Smokes(x)
+1.5 Sport(x) => !Smokes(x)
+0.2 Smokes(x)
 """
+
+PULLS = "1.1 Friends(x, y) ^ Smokes(x) => Smokes(y)\n1.1 Rivals(x, y) ^ Smokes(x) => !Smokes(y)\n"
+OPPOSES = "1.1 Friends(x, y) => (Smokes(x) <=> Smokes(y))\n1.1 Rivals(x, y) => !(Smokes(x) <=> Smokes(y))\n"
 
 
 def evidence_of(model: Model, sizes: dict[str, int], facts: dict[str, np.ndarray]) -> Evidence:
@@ -76,18 +72,26 @@ def smokers(n_people: int, n_friends: int = 10, seed: int = 0) -> tuple[Model, E
     return model, evidence_of(model, {"person": n_people}, facts)
 
 
-def rivals(n_people: int = 500, degree: float = 6.0, share: float = 0.3, seed: int = 0) -> tuple[Model, Evidence]:
-    """Frustrated: friends pull a person into smoking, rivals out of it. `2 n_people` atoms."""
+def rivals(
+    n_people: int = 1000, degree: float = 4.0, share: float = 0.3, seed: int = 0, *, opposed: bool = False
+) -> tuple[Model, Evidence]:
+    """Frustrated: friends and rivals, both ways, at random. One atom for each person, of that mean degree.
+
+    A friend of a smoker is to smoke, a rival of a smoker is not. `opposed`: a rival is to do the opposite, whatever
+    that is, which is a spin glass in a random field.
+    """
     rng = np.random.default_rng(seed)
     pairs = rng.integers(0, n_people, (int(n_people * degree / 2), 2))
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
     rival = rng.random(len(pairs)) < share
+    people = np.arange(n_people)[:, None]
     facts = {
-        "Friends": pairs[~rival],
-        "Rivals": pairs[rival],
-        "Habit": np.stack([np.arange(n_people), rng.integers(0, 6, n_people)], axis=1),
+        "Friends": np.concatenate([pairs[~rival], pairs[~rival][:, ::-1]]),
+        "Rivals": np.concatenate([pairs[rival], pairs[rival][:, ::-1]]),
+        "Stress": people[rng.random(n_people) < 0.5],
+        "Sport": people[rng.random(n_people) < 0.4],
     }
-    model = ml.model_from_text(RIVALS)
+    model = ml.model_from_text(RIVALS + (OPPOSES if opposed else PULLS))
     return model, evidence_of(model, {"person": n_people}, facts)
 
 

@@ -43,6 +43,7 @@ WORKLOADS: dict[str, tuple[Callable[[], tuple], tuple[Method, ...]]] = {
     "entities-100-.1": (lambda: generators.entities(100, 0.1), ("auto",)),
     "entities-300-.05": (lambda: generators.entities(300, 0.05), ("auto",)),
     "rivals-1000": (generators.rivals, ("auto", "ilp", "wcsp", "annealing", "maxwalksat")),
+    "rivals-1000-opposed": (lambda: generators.rivals(opposed=True), ("auto", "ilp", "wcsp", "annealing")),
     "regions-32": (generators.regions, ("auto", "ilp", "wcsp", "annealing", "maxwalksat")),
     "items-1000": (generators.items, ("auto", "ilp", "wcsp", "annealing", "maxwalksat")),
 }

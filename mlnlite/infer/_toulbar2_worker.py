@@ -11,7 +11,7 @@ import os
 import sys
 from typing import Any
 
-from pytoulbar2 import CFN
+from pytoulbar2 import CFN, pytb2
 
 
 def main() -> None:
@@ -34,13 +34,16 @@ def solve(problem: dict[str, Any]) -> dict[str, Any]:
 
     Args:
         problem: `cardinality` of each variable; `functions` as [scope, default cost, cells, costs], cells being lists
-            of values and a cost of null forbidding the cell; `seconds`, 0 for no limit; `seed`.
+            of values and a cost of null forbidding the cell; `seconds`, 0 for no limit; `seed`; `backtracks`, null
+            for no limit.
 
     Returns:
         `state` and its `cost`, null if none was found; `bound`, the least that any state costs, null if unknown;
         `optimal`, whether the state is proved to be one of least cost.
     """
     network = CFN(resolution=0, seed=problem["seed"], vac=0, verbose=-1)
+    if problem["backtracks"] is not None:
+        pytb2.option.backtrackLimit = problem["backtracks"]
     for v, size in enumerate(problem["cardinality"]):
         network.AddVariable(f"v{v}", range(size))
     try:

@@ -16,6 +16,7 @@ from mlnlite.infer.parts import Part, PartAnswer, all_gains
 ANNEALING = "annealing"
 _COLDEST = 0.05
 _CHUNK = 2_000_000
+_MOVES, _PER_VARIABLE = 2e7, 20_000
 FOREVER = Deadline()
 
 
@@ -24,7 +25,7 @@ def solve_part(
     deadline: Deadline = FOREVER,
     seed: int = 0,
     *,
-    moves: float = 2e7,
+    moves: float | None = None,
     restarts: int = 4,
     start: Int64 | None = None,
 ) -> PartAnswer:
@@ -34,7 +35,7 @@ def solve_part(
         part: the component.
         deadline: when to stop.
         seed: of chance.
-        moves: how many moves to try in all.
+        moves: how many moves to try in all, by default 20,000 for each variable, but at most 2e7.
         restarts: how often the temperature falls.
         start: shape (n,), a world to start from.
     """
@@ -42,7 +43,7 @@ def solve_part(
     n = len(part.variables)
     world = np.zeros(n, np.int64) if start is None else start.copy()
     best, top = world.copy(), worth(landscape, world)
-    sweeps = max(10, int(moves / restarts / n))
+    sweeps = max(10, int((moves or min(_MOVES, _PER_VARIABLE * n)) / restarts / n))
     for _ in range(restarts):
         best, top = _fall(landscape, best, top, temperatures(landscape, sweeps), rng, deadline)
         if deadline.is_over:

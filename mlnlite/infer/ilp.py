@@ -60,7 +60,13 @@ class Columns:
 
 
 def solve_part(
-    part: Part, deadline: Deadline = FOREVER, seed: int = 0, *, gap: float = 0.0, start: Int64 | None = None
+    part: Part,
+    deadline: Deadline = FOREVER,
+    seed: int = 0,
+    *,
+    gap: float = 0.0,
+    start: Int64 | None = None,
+    nodes: int | None = None,
 ) -> PartAnswer:
     """Solves a component.
 
@@ -70,10 +76,11 @@ def solve_part(
         seed: of the solver.
         gap: stop when no world can be better than this share of the cost of the best one.
         start: shape (n,), a world to start from.
+        nodes: after how many nodes to stop, None for no limit.
     """
     part, constant = with_costs(part)
     program, columns = program_of(part)
-    answer, _ = solve_program(program, columns, part, deadline, seed, gap=gap, start=start)
+    answer, _ = solve_program(program, columns, part, deadline, seed, gap=gap, start=start, nodes=nodes)
     return replace(answer, bound=answer.bound + constant)
 
 
@@ -86,12 +93,15 @@ def solve_program(
     *,
     gap: float = 0.0,
     start: Int64 | None = None,
+    nodes: int | None = None,
 ) -> tuple[PartAnswer, Float]:
     """Solves the program of a component, to which rows may have been added; returns the values of all columns too."""
     solver = highspy.Highs()  # type: ignore[no-untyped-call]
     options = {"output_flag": False, "random_seed": seed, "threads": 1, "mip_rel_gap": gap, "mip_abs_gap": _ABSOLUTE}
     for name, setting in options.items():
         solver.setOptionValue(name, setting)
+    if nodes is not None:
+        solver.setOptionValue("mip_max_nodes", nodes)
     if np.isfinite(deadline.left):
         solver.setOptionValue("time_limit", max(0.1, deadline.left))
     solver.passModel(model_of(program, columns.n))
@@ -162,7 +172,7 @@ def literals(columns: Columns, scope: Int64, value: Int64) -> tuple[Int64, Float
     return column, sign, np.where(sign < 0, 1.0, 0.0)
 
 
-def _add_rows(program: Program, column: Int64, value: Float, limit: Float) -> None:
+def add_rows(program: Program, column: Int64, value: Float, limit: Float) -> None:
     """Adds rows `sum value * column <= limit`; shapes (n, k), (n, k), (n,)."""
     n, k = column.shape
     program.row.append(np.repeat(np.arange(program.n_rows, program.n_rows + n), k))
@@ -185,7 +195,7 @@ def _add_blocks(program: Program, columns: Columns, part: Part) -> None:
     for v in np.flatnonzero(~columns.binary).tolist():
         own = columns.first[v] + np.arange(part.cardinality[v])[None]
         for sign in (1.0, -1.0):
-            _add_rows(program, own, np.full(own.shape, sign), np.array([sign]))
+            add_rows(program, own, np.full(own.shape, sign), np.array([sign]))
 
 
 def _add_cells(program: Program, columns: Columns, cells: Cells) -> None:
@@ -193,7 +203,7 @@ def _add_cells(program: Program, columns: Columns, cells: Cells) -> None:
     column, sign, add = literals(columns, cells.scope.astype(np.int64), cells.value.astype(np.int64))
     room = column.shape[1] - 1 - add.sum(axis=1)
     hard, pays = np.isneginf(cells.amount), cells.amount > 0
-    _add_rows(program, column[hard], sign[hard], room[hard])
+    add_rows(program, column[hard], sign[hard], room[hard])
     if column.shape[1] == 1:
         soft = ~hard
         np.add.at(program.cost[0], column[soft, 0], -cells.amount[soft] * sign[soft, 0])
@@ -202,11 +212,11 @@ def _add_cells(program: Program, columns: Columns, cells: Cells) -> None:
     costs = ~hard & ~pays
     extra = _add_columns(program, -cells.amount[costs], 1.0)[:, None]
     ones = np.ones(extra.shape)
-    _add_rows(program, np.hstack([column[costs], extra]), np.hstack([sign[costs], -ones]), room[costs])
+    add_rows(program, np.hstack([column[costs], extra]), np.hstack([sign[costs], -ones]), room[costs])
     extra = _add_columns(program, -cells.amount[pays], 1.0)
     for c in range(column.shape[1]):
         pair = np.stack([extra, column[pays, c]], axis=1)
-        _add_rows(program, pair, np.stack([np.ones(len(extra)), -sign[pays, c]], axis=1), add[pays, c])
+        add_rows(program, pair, np.stack([np.ones(len(extra)), -sign[pays, c]], axis=1), add[pays, c])
 
 
 def _without_cliques(program: Program, columns: Columns, cells: Cells) -> Iterator[Cells]:
@@ -241,11 +251,11 @@ def _add_count(program: Program, literals: tuple[Int64, Float, Float], amount: f
     column, sign, add = literals
     n = len(column)
     if not np.isfinite(amount):
-        _add_rows(program, column[None], sign[None], np.array([1.0 - add.sum()]))
+        add_rows(program, column[None], sign[None], np.array([1.0 - add.sum()]))
         return
     extra = _add_columns(program, -amount * np.arange(1.0, n), 1.0)
     row = np.concatenate([column, extra])[None]
-    _add_rows(program, row, np.concatenate([sign, -np.ones(n - 1)])[None], np.array([1.0 - add.sum()]))
+    add_rows(program, row, np.concatenate([sign, -np.ones(n - 1)])[None], np.array([1.0 - add.sum()]))
 
 
 def model_of(program: Program, n_integer: int) -> highspy.HighsLp:

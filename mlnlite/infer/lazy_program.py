@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import highspy
 import numpy as np
 
 from mlnlite.engines.plan import Engine
 from mlnlite.ground.network import Bool, Float, Int64
-from mlnlite.infer import ilp
+from mlnlite.infer import ilp, relaxation
 from mlnlite.infer.costs import with_costs
 from mlnlite.infer.equivalence import Ties, contracted, put_back_ties
 from mlnlite.infer.parts import Part, all_gains, grain_of
 from mlnlite.infer.potentials import Potentials, potentials_of
-from mlnlite.infer.relaxation import bound_of
 from mlnlite.infer.rows import Rows, add_clauses, add_stars, drop_slack, least_used, paid_so_far, with_rows
 from mlnlite.infer.rungs import Options
 from mlnlite.infer.score import log_weight, truth_of
@@ -27,7 +25,7 @@ from mlnlite.infer.separation import Reading, lack, near_violations, stars
 from mlnlite.infer.waiting import Lazy, violated_weight
 
 _PER_COLUMN = 4
-_VIOLATED, _LOOSE, _CLOSE = 1e-3, 1e-4, 1e-4
+_VIOLATED, _CLOSE = 1e-3, 1e-4
 _NEARLY, _LEAST_GAIN, _STALLED = 1e-3, 0.01, 4
 
 
@@ -164,10 +162,13 @@ def _relax(search: _Search) -> None:
     """Linear programs, until no row is violated, or a world is proved."""
     exact, n_same, rng = False, 0, np.random.default_rng(search.options.seed)
     while not search.options.deadline.is_over and n_same < _STALLED:
-        before = search.found.bound
-        x, multipliers = _solve(search, exact=exact)
-        if x is None or multipliers is None:
+        before, part = search.found.bound, search.base.part
+        program = with_rows(search.base.program, search.rows)
+        x, multipliers, bound = relaxation.solve_program(part, program, search.options.deadline, exact=exact)
+        if x is None:
             return
+        search.found.bound = min(search.found.bound, search.base.constant + bound)
+        _fix(search, search.base.constant + bound + relaxation.bound_of(part, program, multipliers)[1])
         drop_slack(search.rows, x, multipliers[search.base.program.n_rows :])
         n_added = _separate(search, x, rng)
         if not n_added or (np.minimum(x, 1 - x) > _VIOLATED).mean() < _NEARLY:
@@ -176,31 +177,6 @@ def _relax(search: _Search) -> None:
             return
         exact = not n_added or search.found.gap < _NEARLY * _cost(search)
         n_same = n_same + 1 if before - search.found.bound < _LEAST_GAIN * search.found.gap else 0
-
-
-def _solve(search: _Search, *, exact: bool) -> tuple[Float | None, Float | None]:
-    """Solution and multipliers of the linear program, if there are any; the bound follows from the latter."""
-    base = search.base
-    program = with_rows(base.program, search.rows)
-    solver = highspy.Highs()  # type: ignore[no-untyped-call]
-    for name, setting in (("output_flag", False), ("threads", 1), ("solver", "ipm")):
-        solver.setOptionValue(name, setting)
-    solver.setOptionValue("run_crossover", "off")
-    if not exact:
-        solver.setOptionValue("ipm_optimality_tolerance", _LOOSE)
-    if np.isfinite(search.options.deadline.left):
-        solver.setOptionValue("time_limit", max(0.1, search.options.deadline.left))
-    solver.passModel(ilp.model_of(program, 0))
-    ilp.stop_with(solver, search.options.deadline)
-    solver.run()
-    solution = solver.getSolution()
-    if not (solution.value_valid and solution.dual_valid):
-        return None, None
-    multipliers = np.array(solution.row_dual)
-    bound, each = bound_of(base.part, program, multipliers)
-    search.found.bound = min(search.found.bound, base.constant + bound)
-    _fix(search, base.constant + bound + each)
-    return np.array(solution.col_value), multipliers
 
 
 def _fix(search: _Search, bounds: Float) -> None:

@@ -16,7 +16,8 @@ from mlnlite.infer.ilp import Program, model_of, program_of, stop_with, world_of
 from mlnlite.infer.parts import Part, PartAnswer, all_gains, value_of
 
 RELAXATION = "lp"
-_CLOSE = 1e-7
+_CLOSE, _LOOSE = 1e-7, 1e-4
+_FEWEST, _WORK = 200, 2_000_000_000
 FOREVER = Deadline()
 
 
@@ -30,7 +31,12 @@ def solve_part(part: Part, deadline: Deadline = FOREVER, solver_name: str = "pdl
     """
     program, columns = program_of(part)
     solver = highspy.Highs()  # type: ignore[no-untyped-call]
-    for name, setting in (("output_flag", False), ("threads", 1), ("solver", solver_name)):
+    for name, setting in (
+        ("output_flag", False),
+        ("threads", 1),
+        ("solver", solver_name),
+        ("pdlp_iteration_limit", _iterations(part)),
+    ):
         solver.setOptionValue(name, setting)
     if np.isfinite(deadline.left):
         solver.setOptionValue("time_limit", max(0.1, deadline.left))
@@ -46,6 +52,42 @@ def solve_part(part: Part, deadline: Deadline = FOREVER, solver_name: str = "pdl
     if not np.isfinite(value):
         return PartAnswer(None, bound, False, RELAXATION)
     return PartAnswer(world, bound, bound - value <= _CLOSE * max(1.0, abs(value)), RELAXATION)
+
+
+def _iterations(part: Part) -> int:
+    """How far the first-order solver goes: less on large components, whatever the clock says."""
+    return max(_FEWEST, _WORK // max(1, sum(len(c.amount) for c in part.cells)))
+
+
+def solve_program(
+    part: Part, program: Program, deadline: Deadline, *, exact: bool
+) -> tuple[Float | None, Float, float]:
+    """Solves the linear relaxation of a program that grows, from the inside.
+
+    Args:
+        part: the component.
+        program: its program, to which rows may have been added.
+        deadline: when to stop.
+        exact: to full precision; else only as well as separation needs it.
+
+    Returns:
+        A point in the middle of the best face, None if the solver did not get there; multipliers of the rows; the
+        bound that these prove.
+    """
+    solver = highspy.Highs()  # type: ignore[no-untyped-call]
+    for name, setting in (("output_flag", False), ("threads", 1), ("solver", "ipm"), ("run_crossover", "off")):
+        solver.setOptionValue(name, setting)
+    if not exact:
+        solver.setOptionValue("ipm_optimality_tolerance", _LOOSE)
+    if np.isfinite(deadline.left):
+        solver.setOptionValue("time_limit", max(0.1, deadline.left))
+    solver.passModel(model_of(program, 0))
+    stop_with(solver, deadline)
+    solver.run()
+    found = solver.getSolution()
+    multipliers = np.array(found.row_dual) if found.dual_valid else np.zeros(program.n_rows)
+    bound, _ = bound_of(part, program, multipliers)
+    return np.array(found.col_value) if found.value_valid else None, multipliers, bound
 
 
 def bound_of(part: Part, program: Program, multipliers: Float) -> tuple[float, Float]:

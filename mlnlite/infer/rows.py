@@ -78,7 +78,7 @@ def add_clauses(rows: Rows, clauses: GroundClauses, weights: Float) -> None:
     paid = columns_paid(rows, clauses, weights)[:, None]
     column = np.hstack([clauses.column, np.maximum(paid, 0)])
     value = np.hstack([-clauses.sign, np.where(paid >= 0, -1.0, 0.0)])
-    _append(rows, column, value, (clauses.sign < 0).sum(axis=1) - 1.0)
+    append(rows, column, value, (clauses.sign < 0).sum(axis=1) - 1.0)
 
 
 def add_stars(rows: Rows, found: Stars, clauses: GroundClauses, weights: Float) -> None:
@@ -92,10 +92,10 @@ def add_stars(rows: Rows, found: Stars, clauses: GroundClauses, weights: Float) 
     pays = there & (paid[c] >= 0)
     column = np.hstack([found.column, clauses.column[at], np.where(pays, paid[c], 0)])
     value = np.hstack([found.sign, -excuse_sign, np.where(pays, -1.0, 0.0)])
-    _append(rows, column, value, 1.0 - (found.sign < 0).sum(axis=1) + (excuse_sign < 0).sum(axis=1))
+    append(rows, column, value, 1.0 - (found.sign < 0).sum(axis=1) + (excuse_sign < 0).sum(axis=1))
 
 
-def _append(rows: Rows, column: Int64, value: Float, limit: Float) -> None:
+def append(rows: Rows, column: Int64, value: Float, limit: Float) -> None:
     """Adds rows of equal width; entries of value 0 are left out."""
     there = value != 0
     rows.column = np.concatenate([rows.column, column[there]])

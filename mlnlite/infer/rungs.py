@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from math import inf
 from typing import Literal, TypedDict, get_args
 
 from mlnlite.errors import QueryMistake
 from mlnlite.ground.network import Int64
-from mlnlite.infer import annealing, ilp, maxsat, mincut, relaxation, toulbar2, walksat
+from mlnlite.infer import annealing, cycles, ilp, maxsat, mincut, relaxation, toulbar2, walksat
 from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.parts import Part, PartAnswer, all_gains, identity, value_of
 from mlnlite.infer.workers import Ask, workers
 
 Method = Literal["auto", "ve", "mincut", "ilp", "wcsp", "maxsat", "annealing", "maxwalksat"]
 METHODS: tuple[Method, ...] = get_args(Method)
-_FIRST_TRY = 5.0
 _FEW, _MANY, _TOO_MANY = 400, 20_000, 3_000_000
+_CYCLES_UP_TO = 20_000
+_NODES, _BACKTRACKS, _WORK = 50, (200, 50_000), 10_000_000
+"""How much of a rung is a try: nodes of an integer program; backtracks, at least, at most and by number of cells."""
 
 
 class Search(TypedDict, total=False):
@@ -70,8 +71,8 @@ def answers_of(parts: Sequence[Part], options: Options) -> Iterator[list[PartAns
 def _search(part: Part, options: Options, deadline: Deadline, ask: Ask) -> list[PartAnswer]:
     """Climbs until something is proved, or good enough."""
     answers: list[PartAnswer] = []
-    for rung, seconds in _ladder(part, options, ask):
-        answer = rung(part, deadline.within(seconds), answers)
+    for rung in _ladder(part, options, ask):
+        answer = rung(part, deadline, answers)
         answers += [] if answer is None else [answer]
         if deadline.is_over or any(a.optimal for a in answers) or _is_close(part, answers, options.gap):
             break
@@ -93,26 +94,49 @@ def best_of(part: Part, answers: list[PartAnswer]) -> Int64 | None:
     return max(worlds, key=lambda world: value_of(part, world), default=None)
 
 
-def _ladder(part: Part, options: Options, ask: Ask) -> list[tuple[Rung, float]]:
-    """Rungs in the order to try them, and how long each may take [s]."""
+def _ladder(part: Part, options: Options, ask: Ask) -> list[Rung]:
+    """Rungs in the order to try them; how far a try goes depends on the component alone, never on the clock."""
     single = _single(options, ask)
     if options.method in single:
         return single[options.method]
-    by_ilp, by_wcsp, by_annealing = single["ilp"][0][0], single["wcsp"][0][0], single["annealing"][0][0]
     n_cells = sum(len(c.amount) for c in part.cells)
-    steps: list[tuple[Rung, float]] = [(_by_mincut, inf)]
     if n_cells > _TOO_MANY:
-        return [*steps, *single["annealing"]]
-    tried = [(by_wcsp, _FIRST_TRY)] if toulbar2.is_available() else []
-    mixed = (part.cardinality > 2).any() or max((c.scope.shape[1] for c in part.cells), default=0) == 3
+        return [_by_mincut, *single["annealing"]]
+    tried = [_trying_wcsp(part, options, ask)] if toulbar2.is_available() else []
+    widest = max((c.scope.shape[1] for c in part.cells), default=0)
+    mixed = bool((part.cardinality > 2).any()) or widest == 3
+    last: list[Rung] = [*single["annealing"][:1], *single["ilp"]]
+    if widest <= 2 and not mixed and len(part.variables) <= _CYCLES_UP_TO:
+        return [_by_mincut, *tried, *single["annealing"][:1], _cycles(options), *single["ilp"]]
     if len(part.variables) <= _FEW and mixed:
-        return [*steps, *tried, (by_annealing, inf), (by_ilp, inf)]
-    relaxed: list[tuple[Rung, float]] = [(_by_relaxation, 2 * _FIRST_TRY)] if n_cells > _MANY else []
-    first = tried if mixed else [(by_ilp, _FIRST_TRY), *tried]
-    return [*steps, *relaxed, *first, (by_annealing, inf), (by_ilp, inf)]
+        return [_by_mincut, *tried, *last]
+    relaxed: list[Rung] = [_by_relaxation] if n_cells > _MANY else []
+    first = tried if mixed or relaxed else [_trying_ilp(options), *tried]
+    return [_by_mincut, *relaxed, *first, *last]
 
 
-def _single(options: Options, ask: Ask) -> dict[str, list[tuple[Rung, float]]]:
+def _trying_wcsp(part: Part, options: Options, ask: Ask) -> Rung:
+    """toulbar2 for so many backtracks."""
+    n_cells = sum(len(c.amount) for c in part.cells)
+    backtracks = min(max(_WORK // max(n_cells, 1), _BACKTRACKS[0]), _BACKTRACKS[1])
+    return lambda part, deadline, _: toulbar2.solve_part(part, ask, deadline, options.seed, backtracks=backtracks)
+
+
+def _trying_ilp(options: Options) -> Rung:
+    """An integer program for so many nodes."""
+    return lambda part, deadline, before: ilp.solve_part(
+        part, deadline, options.seed, gap=options.gap, start=best_of(part, before), nodes=_NODES
+    )
+
+
+def _cycles(options: Options) -> Rung:
+    """Odd cycles, then an integer program."""
+    return lambda part, deadline, before: cycles.solve_part(
+        part, deadline, options.seed, gap=options.gap, start=best_of(part, before)
+    )
+
+
+def _single(options: Options, ask: Ask) -> dict[str, list[Rung]]:
     """What each method does by itself; searches without a proof get the bound of the linear relaxation."""
     seed = options.seed
 
@@ -132,12 +156,12 @@ def _single(options: Options, ask: Ask) -> dict[str, list[tuple[Rung, float]]]:
         return walksat.solve_part(part, deadline, seed)
 
     return {
-        "ilp": [(by_ilp, inf)],
-        "wcsp": [(by_wcsp, inf)],
-        "maxsat": [(by_maxsat, inf)],
-        "mincut": [(_only_mincut, inf)],
-        "annealing": [(by_annealing, inf), (_by_relaxation, _FIRST_TRY)],
-        "maxwalksat": [(by_walksat, inf), (_by_relaxation, _FIRST_TRY)],
+        "ilp": [by_ilp],
+        "wcsp": [by_wcsp],
+        "maxsat": [by_maxsat],
+        "mincut": [_only_mincut],
+        "annealing": [by_annealing, _by_relaxation],
+        "maxwalksat": [by_walksat, _by_relaxation],
     }
 
 

@@ -29,7 +29,7 @@ def is_available() -> bool:
     return find_spec("pytoulbar2") is not None
 
 
-def solve_part(part: Part, ask: Ask, deadline: Deadline, seed: int = 0) -> PartAnswer:
+def solve_part(part: Part, ask: Ask, deadline: Deadline, seed: int = 0, *, backtracks: int | None = None) -> PartAnswer:
     """Solves a component.
 
     Args:
@@ -37,6 +37,7 @@ def solve_part(part: Part, ask: Ask, deadline: Deadline, seed: int = 0) -> PartA
         ask: what runs the solver.
         deadline: when to stop with the best so far.
         seed: of the solver.
+        backtracks: after how many to stop, None for no limit.
 
     Raises:
         MissingPart: toulbar2 is not installed (there is none for Windows).
@@ -45,7 +46,7 @@ def solve_part(part: Part, ask: Ask, deadline: Deadline, seed: int = 0) -> PartA
         raise MissingPart("toulbar2 is not installed", hint="pip install pytoulbar2 (not made for Windows)")
     problem, scale, rounding = _problem(part)
     left = deadline.left
-    problem |= {"seconds": max(1, int(min(left, _LONGEST))), "seed": seed + 1}
+    problem |= {"seconds": max(1, int(min(left, _LONGEST))), "seed": seed + 1, "backtracks": backtracks}
     reply = ask("_toulbar2_worker", problem, deadline) or {"state": None, "bound": None, "optimal": False}
     world = None if reply["state"] is None else np.array(reply["state"], np.int64)
     bound = np.inf if reply["bound"] is None else -reply["bound"] / scale + rounding

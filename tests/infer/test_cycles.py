@@ -1,0 +1,95 @@
+"""Odd cycles: inequalities that hold in every world, and best worlds against listing all of them."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+import mlnlite as ml
+from benchmarks import generators
+from mlnlite.engines.numpy import NumpyEngine
+from mlnlite.ground.lazy import world_evidence
+from mlnlite.infer import cycles
+from mlnlite.infer.conjunctions import Cells
+from mlnlite.infer.cycles import pairs_of, violated_cycles
+from mlnlite.infer.dominance import merged
+from mlnlite.infer.map import map_of
+from mlnlite.infer.parts import Part, all_gains, value_of
+from mlnlite.infer.relaxation import bound_of, solve_program
+from mlnlite.infer.rows import Rows, with_rows
+from mlnlite.infer.score import costs
+
+
+def frustrated(seed, n, m):
+    """Pairs that attract or repel at random."""
+    rng = np.random.default_rng(seed)
+    scope = np.sort(np.array([rng.choice(n, 2, replace=False) for _ in range(m)]), axis=1).astype(np.int32)
+    value = rng.integers(0, 2, (m, 2)).astype(np.int32)
+    own = Cells(np.arange(n, dtype=np.int32)[:, None], np.ones((n, 1), np.int32), np.round(rng.normal(0, 0.5, n), 2))
+    pairs = merged(Cells(scope, value, np.round(rng.normal(0, 1, m), 2)))
+    return Part(0, np.arange(n), np.full(n, 2, np.int32), (own, pairs))
+
+
+def worlds(part):
+    return np.array(list(product(range(2), repeat=len(part.variables))))
+
+
+@pytest.mark.parametrize("start", [False, True])
+@pytest.mark.parametrize("seed", range(12))
+def test_best_worlds_equal_enumeration(seed, start):
+    part = frustrated(seed, 9, 24)
+    expected = max(value_of(part, w) for w in worlds(part))
+    answer = cycles.solve_part(part, start=np.ones(9, np.int64) if start else None)
+    assert answer.optimal
+    assert value_of(part, answer.world) == pytest.approx(expected, abs=1e-9)
+    assert expected - 1e-9 <= answer.bound <= expected + 1e-5
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_cycles_hold_in_every_world_and_bounds_do(seed):
+    part = frustrated(seed, 7, 16)
+    pairs, rng = pairs_of(part), np.random.default_rng(seed)
+    every = worlds(part)
+    with_nobody = np.concatenate([every, np.zeros((len(every), 1), int)], axis=1)
+    differ = with_nobody[:, pairs.first] != with_nobody[:, pairs.second]
+    rows, n_found = Rows(pairs.program.n_columns), 0
+    for _ in range(20):
+        x = rng.choice([0.0, 0.5, 0.5, 1.0], pairs.program.n_columns)
+        for columns, odd in violated_cycles(pairs, x):
+            assert (1 - x[columns[odd]]).sum() + x[columns[~odd]].sum() < 1
+            assert odd.sum() % 2 == 1
+            assert ((1 - differ[:, columns[odd]]).sum(axis=1) + differ[:, columns[~odd]].sum(axis=1) >= 1).all()
+            n_found += 1
+        cycles._separate(pairs, rows, x)
+    assert n_found
+    program = with_rows(pairs.program, rows)
+    best = max(value_of(part, w) for w in every)
+    _, multipliers, bound = solve_program(part, program, cycles.FOREVER, exact=True)
+    assert bound >= best - 1e-7
+    assert bound_of(part, program, multipliers + rng.normal(0, 0.1, len(multipliers)))[0] >= best - 1e-9
+    assert bound <= all_gains(part) + 1e-9
+
+
+def test_wider_cells_are_no_pairs():
+    triple = Cells(np.array([[0, 1, 2]], np.int32), np.ones((1, 3), np.int32), np.array([-1.0]))
+    assert cycles.solve_part(Part(0, np.arange(3), np.full(3, 2, np.int32), (triple,))) is None
+
+
+def test_frustrated_networks_are_proved():
+    model, evidence = generators.rivals(150)
+    network = ml.ground(model, evidence)
+    best = map_of(network)
+    assert best.status == "optimal"
+    other = map_of(network, method="ilp", gap=0.02)
+    assert other.log_weight <= best.log_weight + 1e-6 <= other.bound + 2e-6
+    whole = ml.ground(model, world_evidence(network, best.truth), engine=NumpyEngine())
+    anew = costs(whole, np.zeros(whole.n_atoms, np.bool_))[0].sum()
+    assert anew == pytest.approx(costs(network, best.truth)[0].sum())
+
+
+def test_what_is_not_proved_has_a_gap():
+    network = ml.ground(*generators.rivals(120, opposed=True))
+    best = map_of(network, time_limit=1.0)
+    longer = map_of(network, time_limit=2.0)
+    assert best.log_weight <= longer.bound + 1e-9
+    assert longer.log_weight <= best.bound + 1e-9
