@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 import click
 
 from mlnlite.cli.files import emit
-from mlnlite.cli.learning import learning_options, prior_of, split_files
+from mlnlite.cli.learning import learning_options, prior_of, read, split_files
 from mlnlite.cli.options import dialect_option, format_option, names, output_option
 from mlnlite.cli.terminal import working
 
@@ -87,9 +87,7 @@ def crossvalidate(**options: Unpack[_Options]) -> None:
     split = ml.Split(by, tuple(key or types), options["folds"], options["repeats"], options["seed"])
     prior = prior_of(options["prior"], options["prior_sd"], options["prior_of"])
     training = ml.Training(options["objective"], tuple(names(options["open_predicates"])), prior)
-    with working("reading"):
-        model = ml.read_model(*models, dialect=options["dialect"])
-        databases = ml.read_evidence(*files, model=model)
+    model, databases = read(models, files, options["dialect"])
     with working("learning and predicting"):
         found = ml.crossvalidate(
             model,

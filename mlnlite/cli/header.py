@@ -51,11 +51,16 @@ def header(learned: LearnedModel, models: tuple[Path, ...], databases: tuple[Pat
 
 
 def _hash(path: Path) -> str:
-    """Content of an input file, also of one that is named `Predicate=file` or `file::table`: its SHA-256."""
+    """What an input says: the SHA-256 of its content; of a mapping (TOML) also that of the tables that it names."""
+    from mlnlite.model.table import read_mapping
+
     name, equals, source = str(path).partition("=")
-    source = source if equals and name.isidentifier() else str(path)
+    files = [source if equals and name.isidentifier() else str(path)]
+    if path.suffix == ".toml":
+        files += [str(table.source) for _, table in read_mapping(path)]
     digest = hashlib.sha256()
-    with open(source.partition("::")[0], "rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
+    for file in files:
+        with open(file.partition("::")[0], "rb") as content:
+            while block := content.read(1 << 20):
+                digest.update(block)
     return digest.hexdigest()

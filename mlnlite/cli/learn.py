@@ -11,7 +11,7 @@ import click
 
 from mlnlite.cli.files import write_whole
 from mlnlite.cli.header import header
-from mlnlite.cli.learning import learning_options, prior_of, split_files
+from mlnlite.cli.learning import learning_options, prior_of, read, split_files
 from mlnlite.cli.options import FILE, dialect_option, format_option, names, output_option, time_limit_option
 from mlnlite.cli.terminal import working
 
@@ -124,9 +124,7 @@ def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report |
     """What was learnt, the report on it, and how probable other databases are."""
     import mlnlite as ml
 
-    with working("reading"):
-        model = ml.read_model(*inputs.models, dialect=options["dialect"])
-        databases = ml.read_evidence(*inputs.databases, model=model)
+    model, databases = read(inputs.models, inputs.databases, options["dialect"])
     if options["shared_constants"]:
         databases = ml.with_shared_constants(databases)
     if options["structure"]:

@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING
 import click
 
 from mlnlite.cli.options import FILE, Command
+from mlnlite.cli.terminal import working
 from mlnlite.errors import MlnError
 
 if TYPE_CHECKING:
     from mlnlite.learn.prior import OnePrior, Prior
+    from mlnlite.model.evidence import Evidence
+    from mlnlite.model.model import Model
+    from mlnlite.syntax.tree import Dialect
 
 DEFAULT_SD = 5.0
 FAMILIES = ("gaussian", "laplace", "cauchy", "hierarchical", "none")
@@ -114,3 +118,15 @@ def split_files(
     if not databases:
         raise MlnError("there is no database to learn from", "name one after the model; `-d FILE` if it ends in .mln")
     return models, databases
+
+
+def read(models: tuple[Path, ...], databases: tuple[Path, ...], dialect: Dialect | None) -> tuple[Model, Evidence]:
+    """Model and databases; what reading found strange goes to standard error."""
+    import mlnlite as ml
+
+    with working("reading"):
+        model = ml.read_model(*models, dialect=dialect)
+        found = ml.read_evidence(*databases, model=model)
+    for warning in found.warnings:
+        click.echo(f"{warning}\n", err=True)
+    return model, found

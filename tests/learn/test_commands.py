@@ -96,3 +96,22 @@ def test_crossvalidate_refuses(files):
 def test_calibration(files):
     run("learn", files / "m.mln", files / "d.db", "-o", files / "o.mln")
     assert "was so" in run("evaluate", files / "o.mln", "-e", files / "d.db", "-q", "C", "--calibration").stdout
+
+
+def test_tables_and_what_is_strange_in_them(tmp_path):
+    """An empty cell of a truth column is an unknown label; rows without a constant are told of."""
+    (tmp_path / "m.mln").write_text("S(p)\nS(x)\n")
+    (tmp_path / "s.csv").write_text("p,truth\nA,true\nB,true\nD,false\nE,\n,true\n")
+    (tmp_path / "s.toml").write_text('[S]\nfile = "s.csv"\n')
+    hashes = []
+    for data in (f"S={tmp_path / 's.csv'}", tmp_path / "s.toml"):
+        result = run("learn", tmp_path / "m.mln", data, "--prior", "none", "-o", tmp_path / "o.mln")
+        assert "say nothing" in result.stderr
+        assert result.stdout.startswith("log-likelihood")
+        header = next(x for x in (tmp_path / "o.mln").read_text().splitlines() if x.startswith("// json: "))
+        hashes.append(json.loads(header[9:])["databases"])
+        assert "0.693" in (tmp_path / "o.mln").read_text()
+    (tmp_path / "s.csv").write_text("p,truth\nA,false\n")
+    run("learn", tmp_path / "m.mln", tmp_path / "s.toml", "-o", tmp_path / "o.mln")
+    header = next(x for x in (tmp_path / "o.mln").read_text().splitlines() if x.startswith("// json: "))
+    assert json.loads(header[9:])["databases"] != hashes[1]

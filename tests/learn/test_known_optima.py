@@ -109,3 +109,33 @@ def test_voting_equals_logistic_regression(sd):
     fit = LogisticRegression(C=sd**2, fit_intercept=False, tol=1e-10, max_iter=10_000).fit(inputs, table[:, 0])
     assert learned.weights == pytest.approx(fit.coef_[0], abs=1e-4)
     assert learned.status == "converged"
+
+
+@pytest.mark.parametrize("sd", [0.5, 1.0, 5.0])
+def test_voting_held_out_no_worse_than_logistic_regression(sd):
+    """Five folds of the representatives whose party is known."""
+    model = ml.read_model(folder("mln", "voting") / "voting.mln")
+    _, table = votes(model, "voting-train.db")
+    names = [*model.predicates]
+    fold = np.random.default_rng(0).permutation(len(table)) % 5
+    hits, losses = np.zeros(2), np.zeros(2)
+    for f in range(5):
+        train, test = table[fold != f], table[fold == f]
+        lines = [f"{n}(R{i})" for i, row in enumerate(train) for n, v in zip(names, row, strict=True) if v]
+        people = ", ".join(f"R{i}" for i in range(len(train)))
+        data = ml.evidence_from_text("\n".join([f"rep = {{{people}}}", *lines]), model=model)
+        learned = ml.learn(model, data, predict=["Democrat"], prior=sd).model
+        lines = [f"{n}(T{i})" for i, row in enumerate(test) for n, v in zip(names[1:], row[1:], strict=True) if v]
+        people = ", ".join(f"T{i}" for i in range(len(test)))
+        asked = ml.evidence_from_text("\n".join([f"rep = {{{people}}}", *lines]), model=learned)
+        answer = ml.marginal(learned, asked, ["Democrat"], closed_world=names[1:])
+        fit = LogisticRegression(C=sd**2, fit_intercept=False, tol=1e-10, max_iter=10_000)
+        inputs = [np.column_stack([np.ones(len(t)), t[:, 1:]]) for t in (train, test)]
+        theirs = fit.fit(inputs[0], train[:, 0]).predict_proba(inputs[1])[:, 1]
+        ours = np.array([answer[f"Democrat(T{i})"] for i in range(len(test))])
+        for k, p in enumerate((ours, theirs)):
+            hits[k] += ((p > 0.5) == test[:, 0]).sum()
+            losses[k] -= np.log(np.where(test[:, 0] > 0, p, 1 - p)).sum()
+    assert hits[0] >= hits[1]
+    assert losses[0] <= losses[1] * (1 + 1e-3)
+    assert hits[0] / len(table) > 0.9

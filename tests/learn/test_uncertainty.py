@@ -9,6 +9,8 @@ import pytest
 
 import mlnlite as ml
 from mlnlite.ground.ground import ground
+from mlnlite.learn import exact as exact_likelihood
+from mlnlite.learn import simulate
 from mlnlite.learn.simulate import draw_worlds, with_facts
 from mlnlite.learn.uncertainty import uncertainty
 from mlnlite.model.evidence import Facts
@@ -93,3 +95,56 @@ def test_one_cluster_is_refused():
     learned = ml.learn(model, data)
     with pytest.raises(ml.QueryMistake, match="two independent clusters"):
         uncertainty(learned, data)
+
+
+def test_wide_components_are_drawn_by_sampling(monkeypatch):
+    """The bootstrap's errors are those of exact draws, give or take, and it says how it drew."""
+    model, data = friends(30, 3)
+    learned = ml.learn(model, data, predict=["S", "C"], objective="likelihood", prior=2.0)
+    exact = uncertainty(learned, data, method="bootstrap", repetitions=60)
+    assert exact.warnings == ()
+    monkeypatch.setattr(simulate, "MOST_WORLDS", 1)
+    sampled = uncertainty(learned, data, method="bootstrap", repetitions=60)
+    assert sampled.sd == pytest.approx(exact.sd, rel=0.5)
+    (warning,) = sampled.warnings
+    assert "drawn by sampling" in warning
+
+
+def test_the_bootstrap_hides_what_the_data_do_not_say():
+    """Of a hundred coins fifty are seen: the errors are those of fifty."""
+    model = ml.model_from_text("S(p)\nS(x)\n")
+    seen = [f"S(P{i})" for i in range(20)] + [f"!S(P{i})" for i in range(20, 50)]
+    hidden = [f"?S(P{i})" for i in range(50, 100)]
+    people = ", ".join(f"P{i}" for i in range(100))
+    expected = 1 / np.sqrt(50 * 0.4 * 0.6)
+    for facts, options in (
+        (seen + hidden, {}),
+        ([f"p = {{{people}}}", *seen], {"open_predicates": ["S"]}),
+    ):
+        data = ml.evidence_from_text("\n".join(facts), model=model)
+        learned = ml.learn(model, data, prior=None, **options)
+        assert learned.weights == pytest.approx([np.log(20 / 30)], abs=1e-5)
+        for method in ("information", "bootstrap"):
+            found = uncertainty(learned, data, method=method, repetitions=60)
+            assert found.sd == pytest.approx([expected], rel=0.35 if method == "bootstrap" else 0.01)
+
+
+def test_errors_of_wide_databases(monkeypatch):
+    """Kept as networks, databases say the same of the errors as listed ones."""
+    model, data = friends(12, 4)
+    options = {"predict": ["S", "C"], "objective": "likelihood", "prior": 2.0}
+    learned = ml.learn(model, data, **options)
+    listed = [uncertainty(learned, data, method=m) for m in ("information", "sandwich")]
+    monkeypatch.setattr(exact_likelihood, "MOST_WORLDS", 0)
+    wide = ml.learn(model, data, **options)
+    for method, expected in zip(("information", "sandwich"), listed, strict=True):
+        found = uncertainty(wide, data, method=method)
+        assert found.sd == pytest.approx(expected.sd, rel=1e-3)
+        assert found.n_clusters == expected.n_clusters
+
+
+def test_margins_have_no_errors():
+    model, data = coins(3, 10)
+    learned = ml.learn(model, data, objective="max-margin")
+    with pytest.raises(ml.QueryMistake, match="no likelihood"):
+        uncertainty(learned, data, method="information")
