@@ -97,11 +97,16 @@ def _safe(scene: Scene, found: Configuration, limits: Limits) -> Check:
 
 def least_distance(scene: Scene, found: Configuration, options: Options | None = None) -> float:
     """The least distance that a configuration keeps from hand and face [m], as the options measure it."""
+    return min(kept_distances(scene, found, options))
+
+
+def kept_distances(scene: Scene, found: Configuration, options: Options | None = None) -> tuple[float, float, float]:
+    """Distances of object and hand, object and face, gripper and hand [m]: what C_S adds up."""
     grasps, options = sample_grasps(scene.thing, scene.robot.gripper), options or Options()
     points = cost_points(scene, grasps.centres[found.grasp])
     at = found.thing.position[None], found.thing.rotation[None, None]
     parts = distances(points, *at, options.distance)
-    return float(min(parts.to_hand[0, 0], parts.to_face[0, 0], parts.gripper_to_hand[0, 0]))
+    return float(parts.to_hand[0, 0]), float(parts.to_face[0, 0]), float(parts.gripper_to_hand[0, 0])
 
 
 def _reach_distance(scene: Scene, grasps: GraspSet, found: Configuration, options: Options) -> float:

@@ -16,6 +16,7 @@ from mlnlite.domains.handover.cli_evaluate import evaluate
 from mlnlite.domains.handover.cli_execute import execute
 from mlnlite.domains.handover.cli_knowledge import dataset, query, train
 from mlnlite.domains.handover.cli_study import study
+from mlnlite.domains.handover.options import COUNT, PICTURES, OutFile
 
 if TYPE_CHECKING:
     from mlnlite.domains.handover.fields import Options
@@ -59,7 +60,7 @@ _SCENE = [
     click.option("--hand", type=(float, float, float), help="Position of the palm, x y z [m]."),
     click.option("--catalogue", type=click.Path(dir_okay=False), help="A TOML file of your own objects."),
     click.option("--levels", type=click.Path(dir_okay=False), help="A TOML file of your own mobility levels."),
-    click.option("--voxels", default=15, show_default=True, help="Voxels along each axis."),
+    click.option("--voxels", default=15, type=COUNT, show_default=True, help="Voxels along each axis."),
     click.option("--step", default=0.03, show_default=True, help="Edge of a voxel [m]."),
 ]
 
@@ -95,8 +96,8 @@ def handover() -> None:
 @click.option("--surface", is_flag=True, help="Distances of surfaces instead of points.")
 @click.option("--exhaustive", is_flag=True, help="Ask about every voxel; same answer, slower.")
 @click.option("--format", "form", type=click.Choice(["text", "json"]), default="text", show_default=True)
-@click.option("--figure", type=click.Path(dir_okay=False), help="Write cost slices and a side view to an image.")
-@click.option("--field", type=click.Path(dir_okay=False), help="Write the reach cost in 3-D to an image.")
+@click.option("--figure", type=OutFile(PICTURES), help="Write cost slices and a side view to an image.")
+@click.option("--field", type=OutFile(PICTURES), help="Write the reach cost in 3-D to an image.")
 @click.option("--view", is_flag=True, help="Show the scene in the browser until interrupted.")
 @click.option("--port", default=8080, show_default=True, help="Of the browser view.")
 @click.pass_context

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from mlnlite.domains.handover import load
+from mlnlite.domains.handover.options import COUNT, OutFile
 
 
 @click.command()
@@ -18,10 +19,12 @@ from mlnlite.domains.handover import load
 @click.option("--script", default="drift", show_default=True, help="still, drift, nervous, lunge or withdraw.")
 @click.option("--track", type=click.Path(dir_okay=False), help="A recorded track of hand and face (JSON).")
 @click.option("--seed", default=0, show_default=True, help="Of noise, loss of sight and the script.")
-@click.option("--log", type=click.Path(dir_okay=False), help="Write the run as JSON lines.")
-@click.option("--replay", type=click.Path(dir_okay=False), help="Write the run as a page to play, .html, or as .viser.")
-@click.option("-n", "--many", default=0, help="Simulate so many random cases instead, and count the causes.")
-@click.option("--workers", default=2, show_default=True, help="Processes for many cases.")
+@click.option("--log", type=OutFile(), help="Write the run as JSON lines, or as .parquet.")
+@click.option(
+    "--replay", type=OutFile((".html", ".viser")), help="Write the run as a page to play, .html, or as .viser."
+)
+@click.option("-n", "--many", type=COUNT, help="Simulate so many random cases instead, and count the causes.")
+@click.option("--workers", default=2, type=COUNT, show_default=True, help="Processes for many cases.")
 def execute(**given: Any) -> None:  # noqa: ANN401 - click passes every option by name
     """Simulate a handover: perceive, infer, plan, grasp, approach, hold, release."""
     simulate, tables = load("execution.simulate"), load("tables")

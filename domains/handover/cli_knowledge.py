@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from mlnlite.domains.handover import load
+from mlnlite.domains.handover.options import COUNT, SOLVERS, OutFile
 
 _LABELS = click.option("--labels", default="sampled", show_default=True,
                        help="sampled from the study's preferences, or what is preferred.")  # fmt: skip
@@ -22,7 +23,7 @@ _CATALOGUE = click.option("--catalogue", type=click.Path(dir_okay=False), help="
 @click.option("--out", "-o", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder.")
 @click.option("--poses/--no-poses", default=True, show_default=True, help="Run the cost model on every cell.")
 @click.option("--robot", default="pr2", show_default=True, help="The giver.")
-@click.option("--workers", default=2, show_default=True, help="Processes for the cost model.")
+@click.option("--workers", default=2, type=COUNT, show_default=True, help="Processes for the cost model.")
 def dataset(labels: str, seed: int, out: str, poses: bool, robot: str, workers: int) -> None:
     """Write 1,657 training instances: 259 study rows and 1,398 synthetic ones over 32 objects."""
     generate, placing, write = load("instances.generate"), load("instances.poses"), load("instances.write")
@@ -45,12 +46,14 @@ def dataset(labels: str, seed: int, out: str, poses: bool, robot: str, workers: 
 
 
 @click.command()
-@click.option("--model", "variant", default="handover", show_default=True, help="handover, backoff, paper, affordance.")
+@click.option(
+    "--model", "variant", default="handover", show_default=True, help="handover, backoff, pairs, paper, affordance."
+)
 @_LABELS
 @_SEED
 @click.option("--data", type=click.Path(dir_okay=False), help="A table of `dataset`; by default it is generated anew.")
 @click.option("--without", default="", help="Objects to leave out, separated by commas.")
-@click.option("--out", "-o", default="handover-learnt.mln", show_default=True, help="The learnt model.")
+@click.option("--out", "-o", default="handover-learnt.mln", show_default=True, type=OutFile(), help="The learnt model.")
 def train(variant: str, labels: str, seed: int, data: str | None, without: str, out: str) -> None:
     """Learn the weights of a model of the domain."""
     generate = load("instances.generate")
@@ -73,7 +76,7 @@ def train(variant: str, labels: str, seed: int, data: str | None, without: str, 
 @click.option("--level", default="H", show_default=True,
               help="Arm mobility: H, H-M, L-M, L; `unknown`; or shares as L=0.7,L-M=0.3.")  # fmt: skip
 @click.option("--robot", default="pr2", show_default=True, help="pr2, panda, or the path of a URDF.")
-@click.option("--solver", default="auto", show_default=True, help="Of the most probable world: auto, wcsp, ilp, ...")
+@click.option("--solver", default="auto", show_default=True, type=SOLVERS, help="Of the most probable world.")
 @click.option("--place/--no-place", default=True, show_default=True, help="Also optimise poses of object and grasp.")
 @_CATALOGUE
 @click.option("--format", "form", type=click.Choice(["text", "json"]), default="text", show_default=True)
@@ -81,10 +84,10 @@ def train(variant: str, labels: str, seed: int, data: str | None, without: str, 
 def query(context: click.Context, /, **given: Any) -> None:  # noqa: ANN401 - click passes every option by name
     """Ask a learnt model where to hand an object over, how to hold it, and why."""
     context.meta["mlnlite.format"] = given["form"]
+    level = parse_level(given["level"])
     asking, advising = load("knowledge.ask"), load("knowledge.advise")
     thing = load("objects").read_object(given["thing"], catalogue=given["catalogue"])
     knowledge = asking.read_learnt(given["model"])
-    level = parse_level(given["level"])
     if given["place"]:
         scene = load("scene").make_scene(thing, given["task"], asking.likeliest(level), given["robot"])
         advice = advising.advise(knowledge, scene, level)

@@ -56,6 +56,4 @@ def choose(word: str, known: Iterable[str], what: str) -> str:
     if word in words:
         return word
     near = did_you_mean(word, words)
-    raise MlnError(
-        f"unknown {what} {word!r}; known: {', '.join(words)}", hint=near or f"choose one of the known {what}s"
-    )
+    raise MlnError(f"unknown {what} {word!r}; known: {', '.join(words)}", hint=near or "choose one of these")

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -148,3 +149,54 @@ def test_the_domain_uses_the_front_door_only():
                     file,
                     node.module,
                 )
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("execute", "--log", "nowhere/x.jsonl"), "no folder 'nowhere'"),
+        (("execute", "--replay", "x.gif"), "known endings: .html, .viser"),
+        (("execute", "-n", "-3"), "-3 is not in the range"),
+        (("optimise", "--figure", "x.xyz"), "known endings: .png"),
+        (("evaluate", "--data", "nowhere"), "cannot read nowhere/handover/dataset.db"),
+        (("train", "-o", "nowhere/k.mln"), "no folder 'nowhere'"),
+        (("query", "none.mln", "--no-place"), "none.mln"),
+        (("query", "none.mln", "--level", "L=x"), "are no shares"),
+        (("query", "none.mln", "--solver", "guess"), "'guess' is not one of"),
+        (("study", "--data", "none.csv"), "cannot read the survey none.csv"),
+    ],
+)
+def test_mistakes_are_told_before_any_work(words, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found = _run(*words)
+    assert found.exit_code == 2
+    assert said in found.output
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("study,unicorn,to_pour,H,A,1", "object in rows.csv:2 'unicorn'"),
+        ("study,mug,to_fly,H,A,1", "task of mug in rows.csv:2 'to_fly'"),
+        ("study,mug,to_pour,Q,A,1", "mobility level in rows.csv:2 'Q'"),
+        ("study,mug,to_pour,H,C,1", "method in rows.csv:2 'C'"),
+        ("study,mug,to_pour,H,A,9", "region of mug in rows.csv:2 '9'; known: 1, 2, 3"),
+        ("", "no instances"),
+    ],
+)
+def test_mistakes_in_instances_have_their_line(row, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rows.csv").write_text(f"source,thing,task,level,method,region\n{row}\n")
+    found = _run("train", "--data", "rows.csv")
+    assert found.exit_code == 2
+    assert said in found.output
+
+
+def test_every_command_option_and_public_name_is_in_the_reference():
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "handover.md").read_text(encoding="utf-8")
+    for name, entry in command.get_command(None, "handover").commands.items():
+        assert f"## mlnlite handover {name}" in page
+        section = page.split(f"## mlnlite handover {name}\n")[1].split("\n## ")[0]
+        options = [o for p in entry.params for o in p.opts if o.startswith("-")]
+        assert [o for o in options if f"`{o}" not in section and f"{o}`" not in section] == []
+    assert [name for name in package._PUBLIC if f"`{name}`" not in page] == []

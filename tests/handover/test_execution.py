@@ -1,5 +1,6 @@
 """Execution: the safety distance, the state machine, logs."""
 
+import io
 import json
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from mlnlite.cli import mlnlite as command
 from mlnlite.domains.handover.execution.guard import Rules, clearance, may_move, needed, shape_of
 from mlnlite.domains.handover.execution.log import read_log, write_log
 from mlnlite.domains.handover.execution.machine import Timing
+from mlnlite.domains.handover.execution.replay import record
 from mlnlite.domains.handover.execution.simulate import (
     Case,
     judge,
@@ -27,6 +29,7 @@ from mlnlite.domains.handover.execution.sockets import Sight
 from mlnlite.domains.handover.execution.tracks import SCRIPTS, Eyes, Track, at, limited, read_track, seen
 from mlnlite.domains.handover.figures import joint_origins
 from mlnlite.domains.handover.pose import transform_points
+from tests.handover import browser
 
 
 @pytest.fixture(scope="module")
@@ -131,12 +134,44 @@ def test_many_cases_are_counted():
 
 def test_log_there_and_back(tmp_path):
     run, _ = simulate(Case("ball"))
-    write_log(run, tmp_path / "run.jsonl")
-    lines = read_log(tmp_path / "run.jsonl")
-    assert lines[-1]["end"] == run.end
-    assert [line["state"] for line in lines[:-1]] == [m.state for m in run.moments]
-    with pytest.raises(ml.MlnError, match="cannot read"):
-        read_log(tmp_path / "none.jsonl")
+    for name in ("run.jsonl", "run.parquet"):
+        write_log(run, tmp_path / name)
+        lines = read_log(tmp_path / name)
+        assert (lines[-1]["end"], lines[-1]["replans"]) == (run.end, run.replans)
+        assert [line["state"] for line in lines[:-1]] == [m.state for m in run.moments]
+        assert np.allclose([line["q_rad"] for line in lines[:-1]], [m.q for m in run.moments], atol=1e-5)
+        with pytest.raises(ml.MlnError, match="cannot"):
+            write_log(run, tmp_path / "nowhere" / name)
+    for name in ("none.jsonl", "none.parquet"):
+        with pytest.raises(ml.MlnError, match="cannot"):
+            read_log(tmp_path / name)
+
+
+@pytest.mark.skipif(browser.CHROMIUM is None, reason="needs a Chromium")
+def test_a_browser_plays_the_replay(tmp_path):
+    """The page needs no server: opened as a file it shows the scene, and the scene moves."""
+    from PIL import Image
+
+    case = Case("ball")
+    run, _ = simulate(case)
+    record(scene_at(case, None), run, tmp_path / "run.html")
+
+    def pixels(send):
+        picture = Image.open(io.BytesIO(browser.picture(send))).convert("RGB")
+        return np.asarray(picture).astype(int)
+
+    with browser.page(f"file://{tmp_path}/run.html", port=9334) as send:
+        browser.wait(lambda: len(np.unique(pixels(send)[:, :900].reshape(-1, 3), axis=0)) > 300, 60)
+        first = pixels(send)
+        assert browser.wait(lambda: (np.abs(pixels(send) - first).max(axis=2) > 60).sum() > 200, 30)
+
+
+def test_a_recording_for_the_viewer(tmp_path):
+    run, _ = simulate(Case("ball"), eyes=Eyes(lost=1.0, blind=100.0))
+    record(scene_at(Case("ball"), None), run, tmp_path / "run.viser")
+    assert (tmp_path / "run.viser").stat().st_size > 1000
+    with pytest.raises(ml.MlnError, match="kind of recording"):
+        record(scene_at(Case("ball"), None), run, tmp_path / "run.gif")
 
 
 def test_recorded_tracks(tmp_path):

@@ -99,6 +99,7 @@ def test_reasons_add_up_to_the_log_odds(knowledge):
             log(first / second), abs=1e-6
         )
     assert "arm mobility (low)" in said(reasons, "handover")[0]
+    assert said(reasons, "handover", most=1)[1].startswith("all else together")
 
 
 def test_advice_has_poses_and_words(knowledge):

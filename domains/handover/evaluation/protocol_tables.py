@@ -34,7 +34,9 @@ level's preference.
 _NOTES = f"""`{TEMPLATE}` takes, as the paper does, the mean pose of the shape context over the training objects for the
 predicted method: the optima of different objects of one shape lie tens of degrees apart, so a mean is within tolerance
 of nearly none of them. The roles of parts were written by us with the catalogue in view, and the catalogue gives the
-labels; the table below says what they are worth. The paper's test objects are {", ".join(PAPER_TEST)}; none of them was
+labels; the table below says what they are worth. The label of the method depends on the level alone, as the study tells
+no more, so who learns what each level prefers is at the ceiling; 100 % is what such labels allow, not what people would
+say of unseen objects. The paper's test objects are {", ".join(PAPER_TEST)}; none of them was
 shown in the study. What was predicted in each split is in `splits.parquet`.
 
 ![splits](splits.png)

@@ -10,7 +10,7 @@ from time import process_time
 
 import numpy as np
 
-from mlnlite.domains.handover.checks import CHECKS, five_checks, least_distance, receiver_effort
+from mlnlite.domains.handover.checks import CHECKS, five_checks, kept_distances, receiver_effort
 from mlnlite.domains.handover.fields import Options
 from mlnlite.domains.handover.methods import hand_over
 from mlnlite.domains.handover.mobility import read_levels
@@ -39,7 +39,8 @@ class Result:
         found: whether there is a configuration.
         passed: checks that hold, by name.
         apart: C_A, distance of the robot's grasp from the receiver's region [m].
-        least: distance kept from hand and face [m].
+        safety: C_S, sum of the distances kept from hand and face [m].
+        least: of these distances [m].
         effort: of the receiver's arm [N m]; nan if out of reach.
         reach: C_R, from the hand to where it takes the object [m].
         seconds: processor time of the search [s].
@@ -51,6 +52,7 @@ class Result:
     found: bool
     passed: tuple[str, ...]
     apart: float
+    safety: float
     least: float
     effort: float
     reach: float
@@ -75,12 +77,13 @@ def _result(scene: Scene, variant: str) -> Result:
     found = hand_over(scene, method, options).configuration
     seconds, names = process_time() - start, (scene.robot.name, scene.receiver.level.name)
     if found is None:
-        return Result(variant, *names, False, (), *(float("nan"),) * 4, seconds)
+        return Result(variant, *names, False, (), *(float("nan"),) * 5, seconds)
     effort = receiver_effort(scene, found)
     passed = tuple(check.name for check in five_checks(scene, found) if check.passed)
     arm, reach = float("nan") if effort is None else effort.arm, np.linalg.norm(found.human_grasp - scene.hand.position)
-    return Result(variant, *names, True, passed, found.appropriateness, least_distance(scene, found), arm,
-                  float(reach), seconds)  # fmt: skip
+    kept = kept_distances(scene, found)
+    return Result(variant, *names, True, passed, found.appropriateness, sum(kept), min(kept), arm, float(reach),
+                  seconds)  # fmt: skip
 
 
 def quality_section(results: Sequence[Result], n: int) -> str:
@@ -96,24 +99,25 @@ def quality_section(results: Sequence[Result], n: int) -> str:
 _QUALITY = """## Quality of the handovers
 
 {n} objects, task `to_hand_over`: how many scenes pass each check, and means over the scenes that have the figure. `C_A`
-is how far the robot's grasp is from the receiver's region, `kept` the distance from hand and face, `C_R` how far the
-hand has to move, all in cm; effort of the arm in N m; processor time of the search in s. Each cost left out is worse in
-what it is for.
+is how far the robot's grasp is from the receiver's region, `C_S` the sum of the distances kept from hand and face,
+`kept` the least of them, `C_R` how far the hand has to move, all in cm; effort of the arm in N m; processor time of the
+search in ms (later levels of A and B find the work of the first one done). What a cost is worth shows in its column
+beside `ours`; the least distance is also held up by the collision test, as a hand that waits must not be touched.
 """
 
 
 def _head(keys: Sequence[str]) -> list[str]:
-    names = (*keys, "scenes", "all five", *CHECKS, "C_A", "kept", "C_R", "effort", "time p50 / p95")
+    names = (*keys, "scenes", "all five", *CHECKS, "C_A", "C_S", "kept", "C_R", "effort", "time p50 / p95")
     return [f"| {' | '.join(names)} |", "|---" * len(names) + "|"]
 
 
 def _line(key: Sequence[str], chosen: Sequence[Result]) -> str:
     passed = [str(sum(name in r.passed for r in chosen)) for name in CHECKS]
     whole = sum(len(r.passed) == len(CHECKS) for r in chosen)
-    lengths = [_mean([100 * getattr(r, name) for r in chosen]) for name in ("apart", "least", "reach")]
-    times = np.percentile([r.seconds for r in chosen], [50, 95])
+    lengths = [_mean([100 * getattr(r, name) for r in chosen]) for name in ("apart", "safety", "least", "reach")]
+    times = np.percentile([1000 * r.seconds for r in chosen], [50, 95])
     cells = [*key, str(len(chosen)), str(whole), *passed, *lengths, _mean([r.effort for r in chosen])]
-    return f"| {' | '.join(cells)} | {times[0]:.2f} / {times[1]:.2f} |"
+    return f"| {' | '.join(cells)} | {times[0]:.0f} / {times[1]:.0f} |"
 
 
 def _mean(values: Sequence[float]) -> str:

@@ -49,7 +49,7 @@ def real_section(found: Sequence[HeldOut]) -> str:
                   "|---|---|---|---|---|---|---|"]  # fmt: skip
         lines += [_real_line(one, name) for name in one.found]
         lines += [f"| memory | {100 * one.memory:.1f} % | | | | | |", ""]
-    return "\n".join([*lines, "![calibration](calibration.png)", ""])
+    return "\n".join([*lines, "![calibration](calibration.png)", "", ""])
 
 
 def _real_line(one: HeldOut, name: str) -> str:
@@ -71,7 +71,7 @@ def cells_section(rows: Sequence[PublishedRow]) -> str:
     same, n = paper_is_lookup(rows)
     return (f"### The paper's conjunction is a look-up table\n\nTrained on all rows, its most probable pair of region "
             f"and method is a most frequent one of the cell in {same} of {n} seen cells "
-            f"({100 * same / n:.1f} %).\n\n")  # fmt: skip
+            f"({100 * same / n:.1f} %).\n")  # fmt: skip
 
 
 def paper_is_lookup(rows: Sequence[PublishedRow]) -> tuple[int, int]:

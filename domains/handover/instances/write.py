@@ -12,8 +12,9 @@ import mlnlite as ml
 from mlnlite.domains.handover.instances.generate import Instance, facts_of
 from mlnlite.domains.handover.instances.poses import Cell, MeanPose, Placed, cell_of
 from mlnlite.domains.handover.knowledge.facts import databases_text, kept
-from mlnlite.domains.handover.knowledge.words import environments_of, read_knowledge, role_of
-from mlnlite.domains.handover.objects import read_object
+from mlnlite.domains.handover.knowledge.words import LEVELS, METHODS, environments_of, read_knowledge, role_of
+from mlnlite.domains.handover.objects import object_names, read_object
+from mlnlite.domains.handover.tables import choose
 
 _POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 _GRASP = tuple(f"grasp_{name}" for name in _POSE)
@@ -59,7 +60,7 @@ def read_rows(path: str | Path) -> tuple[Instance, ...]:
     """Instances of a table that `write_rows` wrote.
 
     Raises:
-        MlnError: no such file, or a column is missing; with the line.
+        MlnError: no such file, a column is missing, or a cell is not what it should be; with the line.
     """
     names = [f.name for f in fields(Instance)]
     try:
@@ -69,15 +70,22 @@ def read_rows(path: str | Path) -> tuple[Instance, ...]:
             if missing:
                 raise ml.MlnError(f"{path}:1: columns are missing: {', '.join(missing)}",
                                   hint="write the table with `mlnlite handover dataset`")  # fmt: skip
-            return tuple(_instance(row, f"{path}:{reader.line_num}") for row in reader)
-    except OSError as reason:
+            rows = tuple(_instance(row, f"{path}:{reader.line_num}") for row in reader)
+    except (OSError, UnicodeDecodeError) as reason:
         raise ml.MlnError(f"cannot read {path}: {reason}", hint="give the path of a table of instances") from None
+    if not rows:
+        raise ml.MlnError(f"{path}: no instances", hint="one line for each instance below the head")
+    return rows
 
 
 def _instance(row: Mapping[str, str], where: str) -> Instance:
-    if not (row["region"] or "").isdigit():
-        raise ml.MlnError(f"{where}: region is {row['region']!r}, expected a number from 1")
-    return Instance(row["source"], row["thing"], row["task"], row["level"], row["method"], int(row["region"]))
+    thing = read_object(choose(row["thing"], object_names(), f"object in {where}"))
+    task = choose(row["task"], dict(thing.affordances), f"task of {thing.name} in {where}")
+    level = choose(row["level"], LEVELS, f"mobility level in {where}")
+    method = choose(row["method"], METHODS, f"method in {where}")
+    numbers = [str(i + 1) for i in range(len(thing.regions))]
+    region = choose(row["region"], numbers, f"region of {thing.name} in {where}")
+    return Instance(row["source"], thing.name, task, level, method, int(region))
 
 
 def _write(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import mlnlite as ml
 from mlnlite.domains.handover.knowledge.ask import Answer, Knowledge, Level, ask, explain, likeliest
 from mlnlite.domains.handover.knowledge.reasons import Reason, said
-from mlnlite.domains.handover.knowledge.words import LEVELS, METHODS, words_table
+from mlnlite.domains.handover.knowledge.words import LEVELS, METHODS, method_name, words_table
 from mlnlite.domains.handover.methods import hand_over
 from mlnlite.domains.handover.objects import HandoverObject
 from mlnlite.domains.handover.scene import Scene
@@ -85,7 +85,7 @@ def advice_text(advice: Advice, proof: ml.MapState | None = None) -> str:
     ]
     for predicate in ("graspRegion", "handover"):
         lines += [f"    - {reason}" for reason in said(advice.reasons, predicate, most=3)]
-    return "\n".join(lines + _proof(answer, proof))
+    return "\n".join(lines + _proof(advice, proof))
 
 
 def _listed(probabilities: Mapping[str, float]) -> str:
@@ -111,12 +111,15 @@ def _numbers(values: Any) -> str:  # noqa: ANN401 - any array
     return " ".join(f"{v:.3f}" for v in values)
 
 
-def _proof(answer: Answer, proof: ml.MapState | None) -> list[str]:
-    exact = "exact" if answer.error == 0 else f"standard error at most {answer.error:.3g}"
+def _proof(advice: Advice, proof: ml.MapState | None) -> list[str]:
+    error = advice.answer.error
+    exact = "exact" if error == 0 else f"standard error at most {error:.3g}"
     if proof is None:
         return [f"  probabilities {exact}"]
-    chosen = " and ".join(proof.true_atoms)
-    return [f"  probabilities {exact}; together most probable: {chosen} ({proof.status}, gap {proof.gap:.2g})"]
+    chosen = dict(atom.rstrip(")").split("(") for atom in proof.true_atoms)
+    values = {name: arguments.split(", ")[-1] for name, arguments in chosen.items()}
+    together = f"{advice.thing.regions[int(values['graspRegion']) - 1]} and method {method_name(values['handover'])}"
+    return [f"  probabilities {exact}; together most probable: {together} ({proof.status}, gap {proof.gap:.2g})"]
 
 
 def advice_data(advice: Advice, proof: ml.MapState | None = None) -> dict[str, Any]:

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp
 
 import mlnlite as ml
 from mlnlite.domains.handover.knowledge.facts import Fact, fact_text
 from mlnlite.domains.handover.knowledge.words import words_table
+
+NOTABLE = 0.1
+"""Log-odds below this are not worth a sentence: odds of 1.1 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +80,20 @@ def plain(formula: str, facts: Sequence[Fact]) -> str:
 
 
 def said(reasons: Sequence[Reason], predicate: str, *, most: int = 4) -> list[str]:
-    """The strongest reasons of an answer as sentences."""
-    chosen = [r for r in reasons if r.predicate == predicate][:most]
-    return [f"{r.because} {_strength(r)} ({r.log_odds:+.2f})" for r in chosen if abs(r.log_odds) >= 0.005]
+    """The strongest reasons of an answer as sentences, then what the others come to together."""
+    about = [r for r in reasons if r.predicate == predicate]
+    chosen = [r for r in about[:most] if abs(r.log_odds) >= NOTABLE]
+    others = about[len(chosen) :]
+    if others:
+        what = "all else together" if chosen else "all that is known"
+        chosen.append(replace(others[0], because=what, log_odds=sum(r.log_odds for r in others)))
+    return [f"{r.because} {_strength(r)} ({r.log_odds:+.2f})" for r in chosen]
 
 
 def _strength(reason: Reason) -> str:
     factor = exp(min(abs(reason.log_odds), 20.0))
     name = reason.runner_up if reason.log_odds > 0 else reason.winner
     other = reason.winner if reason.log_odds > 0 else reason.runner_up
-    if factor < 1.1:
+    if abs(reason.log_odds) < NOTABLE:
         return f"makes hardly a difference between {other} and {name}"
     return f"makes {other} {factor:.{int(factor < 10)}f} times as likely, compared with {name}"
