@@ -1,14 +1,17 @@
-"""Which engine runs a plan: NumPy for small inputs, where starting a database would cost more than the answer."""
+"""Which engine runs a plan: NumPy as long as joins fit into memory with ease, DuckDB for what is larger."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cache
+
 from mlnlite.engines.duckdb import DuckDBEngine
-from mlnlite.engines.numpy import NumpyEngine
-from mlnlite.engines.plan import Engine, Tables
+from mlnlite.engines.numpy import NumpyEngine, TooManyRowsError
+from mlnlite.engines.plan import Engine, Plan, Relation, Run, Tables
 from mlnlite.errors import QueryMistake, did_you_mean
 
-SMALL = 50_000
-"""Stored rows up to which NumPy is faster than starting DuckDB (measured: docs/explanation/performance.md)."""
+MOST_ROWS = 1 << 25
+"""Rows of a join up to which NumPy is faster than starting DuckDB (measured: docs/explanation/performance.md)."""
 
 ENGINES: dict[str, type[NumpyEngine] | type[DuckDBEngine]] = {"numpy": NumpyEngine, "duckdb": DuckDBEngine}
 
@@ -25,12 +28,31 @@ def engine_named(name: str) -> Engine:
     return ENGINES[name]()
 
 
-def engine_for(tables: Tables, *, memory: int | None = None) -> Engine:
-    """The engine for inputs of this size.
+def engine_for(*, memory: int | None = None) -> Engine:
+    """The engine to use where none is asked for.
 
     Args:
-        tables: what the plans will draw on.
-        memory: [byte] that a database may use; None for most of what the machine has.
+        memory: [byte] that joins may use, which only DuckDB keeps to; None for most of what the machine has.
     """
-    n_rows = sum(len(columns[0]) for columns in tables.values() if columns)
-    return NumpyEngine() if n_rows <= SMALL and memory is None else DuckDBEngine(memory)
+    return BySize() if memory is None else DuckDBEngine(memory)
+
+
+@dataclass(frozen=True, slots=True)
+class BySize:
+    """NumPy, and DuckDB for plans in which a join turns out to have more than `MOST_ROWS` rows."""
+
+    def load(self, tables: Tables) -> Run:
+        """What runs plans over these tables."""
+        in_memory = NumpyEngine(MOST_ROWS).load(tables)
+
+        @cache
+        def database() -> Run:
+            return DuckDBEngine().load(tables)
+
+        def run(plan: Plan) -> Relation:
+            try:
+                return in_memory(plan)
+            except TooManyRowsError:
+                return database()(plan)
+
+        return run

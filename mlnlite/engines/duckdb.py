@@ -51,7 +51,7 @@ class DuckDBEngine:
                 result = connection.execute(query(plan)).fetchnumpy()
             except duckdb.OutOfMemoryException as error:
                 raise LimitReached(f"a join needs more memory than the limit of {self.memory or 0:,} bytes") from error
-            return {name: np.asarray(result[name], np.int64) for name in columns_of(plan)}
+            return {name: np.asarray(result[name]) for name in columns_of(plan)}
 
         finalize(run, _close, connection, scratch)
         return run

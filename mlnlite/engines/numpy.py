@@ -1,8 +1,13 @@
-"""The reference engine: plans run by NumPy, sort-merge joins, no start-up cost. Best for small inputs."""
+"""The engine in memory: plans run by NumPy, with joins through tables of places. Nothing to start, nothing to copy.
+
+Constants are small numbers, so what a key matches stands in an array at the place of the key; only keys that are too
+sparse for that are sorted. Columns keep their width: what is stored in 32 bits stays in 32 bits.
+"""
 
 from __future__ import annotations
 
-from functools import reduce
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,161 +30,300 @@ from mlnlite.engines.plan import (
     columns_of,
 )
 
+Column = NDArray[Any]
+Bool = NDArray[np.bool_]
 Int64 = NDArray[np.int64]
 
+DENSEST = 1 << 26
+"""Places that an array for look-ups may have."""
 
+
+class TooManyRowsError(Exception):
+    """A join would have more rows than the engine is to hold."""
+
+
+@dataclass(frozen=True, slots=True)
 class NumpyEngine:
-    """Runs plans on NumPy arrays."""
+    """Runs plans on NumPy arrays.
+
+    Attributes:
+        most: rows of a join from which on it is refused with `TooManyRowsError`; None for any number.
+    """
+
+    most: int | None = None
 
     def load(self, tables: Tables) -> Run:
         """What runs plans over these tables."""
-        return lambda plan: _named(plan, _run(plan, tables))
+
+        def run(plan: Plan) -> Relation:
+            rows = _run(plan, tables, self.most)
+            return {c: rows.columns[c] for c in columns_of(plan)}
+
+        return run
 
 
-def _named(plan: Plan, rows: dict[str, Int64]) -> Relation:
-    return {c: rows[c].astype(np.int64, copy=False) for c in columns_of(plan)}
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """A relation: columns of integers of length `n`."""
+
+    columns: dict[str, Column]
+    n: int
+
+    def take(self, index: Int64 | None) -> _Rows:
+        """Some of the rows; None for all."""
+        if index is None:
+            return self
+        return _Rows({name: c[index] for name, c in self.columns.items()}, len(index))
+
+    def keep(self, mask: Bool) -> _Rows:
+        """The rows of a mask."""
+        return self if mask.all() else self.take(np.flatnonzero(mask))
+
+    def value(self, side: str | int) -> Column:
+        """A column, or a constant as one."""
+        kind = np.int32 if isinstance(side, int) and abs(side) < 2**31 else np.int64
+        return self.columns[side] if isinstance(side, str) else np.broadcast_to(kind(side), self.n)
 
 
-def _run(plan: Plan, tables: Tables) -> dict[str, Int64]:
+def _run(plan: Plan, tables: Tables, most: int | None) -> _Rows:
     match plan:
         case Scan():
             return _scan(plan, tables)
         case One():
-            return {"": np.zeros(1, np.int64)}
+            return _Rows({}, 1)
         case Join(left, right):
-            return _join(_run(left, tables), _run(right, tables))
+            return _join(_run(left, tables, most), _run(right, tables, most), most)
         case AntiJoin(left, right):
-            return _antijoin(_run(left, tables), _run(right, tables))
+            return _antijoin(_run(left, tables, most), _run(right, tables, most))
         case Where(source, left_side, operator, right_side):
-            rows = _run(source, tables)
-            equal = _value(rows, left_side) == _value(rows, right_side)
-            return _take(rows, np.flatnonzero(np.broadcast_to(equal == (operator == "="), _length(rows))))
-        case Compute(source, name, terms, constant):
-            rows = _run(source, tables)
-            total = np.full(_length(rows), constant, np.int64)
-            for column, factor in terms:
-                total += rows[column] * np.int64(factor)
-            return {**rows, name: total}
+            rows = _run(source, tables, most)
+            return rows.keep((rows.value(left_side) == rows.value(right_side)) == (operator == "="))
+        case Compute():
+            return _compute(plan, _run(plan.source, tables, most))
         case Lookup():
-            return _lookup(plan, _run(plan.source, tables), tables)
+            return _lookup(plan, _run(plan.source, tables, most), tables)
         case Project(source, kept):
-            rows = _run(source, tables)
-            return {**{c: rows[c] for c in kept}, "": np.zeros(_length(rows), np.int64)}
+            rows = _run(source, tables, most)
+            return _Rows({c: rows.columns[c] for c in kept}, rows.n)
         case Union(sources):
-            return _union([_run(s, tables) for s in sources], columns_of(plan))
+            return _union([_run(s, tables, most) for s in sources], columns_of(plan))
         case Count(source, by):
-            return _count(_run(source, tables), by)
+            return _count(_run(source, tables, most), by)
 
 
-def _length(rows: dict[str, Int64]) -> int:
-    return len(next(iter(rows.values())))
-
-
-def _take(rows: dict[str, Int64], index: Int64) -> dict[str, Int64]:
-    return {name: column[index] for name, column in rows.items()}
-
-
-def _value(rows: dict[str, Int64], side: str | int) -> Int64 | int:
-    return rows[side] if isinstance(side, str) else side
-
-
-def _scan(plan: Scan, tables: Tables) -> dict[str, Int64]:
+def _scan(plan: Scan, tables: Tables) -> _Rows:
     stored = tables[plan.table]
-    keep = np.ones(len(stored[0]) if stored else 1, bool)
-    rows: dict[str, Int64] = {}
+    keep: Bool | None = None
+    columns: dict[str, Column] = {}
     for column, wanted in zip(stored, plan.columns, strict=True):
-        if isinstance(wanted, int):
-            keep &= column == wanted
-        elif wanted in rows:
-            keep &= column == rows[wanted]
-        elif wanted is not None:
-            rows[wanted] = column.astype(np.int64, copy=False)
-    index = np.flatnonzero(keep)
-    return {**_take(rows, index), "": np.zeros(len(index), np.int64)}
+        if wanted is None:
+            continue
+        if isinstance(wanted, str) and wanted not in columns:
+            columns[wanted] = column
+            continue
+        equal = column == (columns[wanted] if isinstance(wanted, str) else wanted)
+        keep = equal if keep is None else keep & equal
+    rows = _Rows(columns, len(stored[0]) if stored else 1)
+    return rows if keep is None else rows.keep(keep)
 
 
-def _packed(*sides: list[Int64]) -> list[Int64]:
-    """One integer for each row of each side, equal where all columns are equal."""
-    packed = [np.zeros(len(side[0]), np.int64) for side in sides]
-    size = 1
+def _compute(plan: Compute, rows: _Rows) -> _Rows:
+    """In 32 bits, if the largest sum fits."""
+    terms = [(rows.columns[column], factor) for column, factor in plan.terms]
+    largest = abs(plan.constant) + sum(abs(factor) * _largest(column) for column, factor in terms)
+    kind: Any = np.int32 if largest < 2**31 else np.int64
+    total = np.full(rows.n, plan.constant, kind)
+    for column, factor in terms:
+        total += column.astype(kind, copy=False) * kind(factor)
+    return _Rows({**rows.columns, plan.name: total}, rows.n)
+
+
+def _largest(column: Column) -> int:
+    return max(int(column.max(initial=0)), -int(column.min(initial=0)))
+
+
+# --- keys
+
+
+@dataclass(frozen=True, slots=True)
+class _Keys:
+    """Several columns as one integer, equal where all are: `(c1 - low1) * width2 + (c2 - low2)` and so on.
+
+    Attributes:
+        sides: the keys of each side.
+        size: a bound of the keys.
+        digits: lowest value and width of each column, if keys can be taken apart again.
+    """
+
+    sides: tuple[Column, ...]
+    size: int
+    digits: tuple[tuple[int, int], ...] | None
+
+    @property
+    def dense(self) -> bool:
+        """Whether an array with a place for each key pays."""
+        return self.size <= min(DENSEST, 8 * sum(map(len, self.sides)) + 4096)
+
+    def columns(self, key: Column) -> list[Column]:
+        """The columns that some keys stand for."""
+        assert self.digits is not None
+        found = []
+        for low, width in reversed(self.digits):
+            key, digit = np.divmod(key, width)
+            found.append(digit + low)
+        return found[::-1]
+
+
+def _keys(*sides: list[Column]) -> _Keys:
+    packed: list[Column] | None = None
+    size, digits = 1, []
+    exact = True
     for columns in zip(*sides, strict=True):
         low = min((int(c.min()) for c in columns if len(c)), default=0)
         width = max((int(c.max()) for c in columns if len(c)), default=0) - low + 1
-        if size * width >= 2**62:
-            _, dense = np.unique(np.concatenate(packed), return_inverse=True)
-            packed = list(np.split(dense.astype(np.int64), np.cumsum([len(p) for p in packed])[:-1]))
-            size = int(dense.max(initial=0)) + 1
-        packed = [p * width + (c - low) for p, c in zip(packed, columns, strict=True)]
+        digits.append((low, width))
+        if width == 1:
+            continue
+        if packed is None:
+            packed = [c if low == 0 else c - low for c in columns]
+        else:
+            if size * width >= 2**62:
+                _, ranks = np.unique(np.concatenate(packed), return_inverse=True)
+                packed = list(np.split(ranks, np.cumsum([len(p) for p in packed])[:-1]))
+                size, exact = int(ranks.max(initial=0)) + 1, False
+            kind: Any = np.int32 if size * width < 2**31 else np.int64
+            packed = [p.astype(kind) * kind(width) + (c - low) for p, c in zip(packed, columns, strict=True)]
         size *= width
-    return packed
+    if packed is None:
+        packed = [np.zeros(len(side[0]), np.int32) for side in sides]
+    return _Keys(tuple(packed), size, tuple(digits) if exact else None)
 
 
-def _shared(left: dict[str, Int64], right: dict[str, Int64]) -> list[str]:
-    return [c for c in right if c and c in left]
+# --- operators
 
 
-def _join(left: dict[str, Int64], right: dict[str, Int64]) -> dict[str, Int64]:
-    shared = _shared(left, right)
-    if shared:
-        left_key, right_key = _packed([left[c] for c in shared], [right[c] for c in shared])
-    else:
-        left_key, right_key = left[""], right[""]
-    order = np.argsort(right_key, kind="stable")
-    right_key = right_key[order]
-    start = np.searchsorted(right_key, left_key, "left")
-    many = np.searchsorted(right_key, left_key, "right") - start
-    left_index = np.repeat(np.arange(len(left_key)), many)
-    ends = np.cumsum(many)
-    within = np.arange(len(left_index)) - np.repeat(ends - many, many)
-    right_index = order[np.repeat(start, many) + within]
-    new = {c: v for c, v in right.items() if c not in left}
-    return {**_take(left, left_index), **_take(new, right_index)}
+def _shared(left: _Rows, right: _Rows) -> list[str]:
+    return [c for c in right.columns if c in left.columns]
 
 
-def _antijoin(left: dict[str, Int64], right: dict[str, Int64]) -> dict[str, Int64]:
+def _join(left: _Rows, right: _Rows, most: int | None) -> _Rows:
     shared = _shared(left, right)
     if not shared:
-        return left if _length(right) == 0 else _take(left, np.empty(0, np.int64))
-    left_key, right_key = _packed([left[c] for c in shared], [right[c] for c in shared])
-    return _take(left, np.flatnonzero(~np.isin(left_key, right_key)))
+        _verify(left.n * right.n, most)
+        left_index = None if right.n == 1 else np.repeat(np.arange(left.n), right.n)
+        return _paired(left, left_index, right, np.tile(np.arange(right.n), left.n))
+    keys = _keys([left.columns[c] for c in shared], [right.columns[c] for c in shared])
+    left_key, right_key = keys.sides
+    if len(right_key) > len(left_key) and not _rising(right_key):
+        index = _matches(right_key, left_key, keys, most)
+        return _paired(right, index[0], left, index[1])
+    index = _matches(left_key, right_key, keys, most)
+    return _paired(left, index[0], right, index[1])
 
 
-def _lookup(plan: Lookup, rows: dict[str, Int64], tables: Tables) -> dict[str, Int64]:
-    *key_columns, value = tables[plan.table]
-    length = _length(rows)
-    found = np.array(np.broadcast_to(np.asarray(_value(rows, plan.default), np.int64), (length,)))
+def _matches(probe: Column, stored: Column, keys: _Keys, most: int | None) -> tuple[Int64 | None, Int64]:
+    """All pairs of equal keys, as indices into both; None for each of the first once."""
+    order = None if _rising(stored) else np.argsort(stored)
+    if keys.dense:
+        n_equal = np.bincount(stored, minlength=keys.size)
+        start, many = (np.cumsum(n_equal) - n_equal)[probe], n_equal[probe]
+    else:
+        ordered = stored if order is None else stored[order]
+        start = np.searchsorted(ordered, probe, "left")
+        many = np.searchsorted(ordered, probe, "right") - start
+    total = int(many.sum())
+    _verify(total, most)
+    first: Int64 | None
+    if many.max(initial=0) <= 1:
+        first = None if total == len(many) else np.flatnonzero(many)
+        second = start if first is None else start[first]
+    else:
+        first = np.repeat(np.arange(len(many)), many)
+        second = np.arange(total) - np.repeat(np.cumsum(many) - many - start, many)
+    return first, second if order is None else order[second]
+
+
+def _rising(key: Column) -> bool:
+    return bool((key[1:] >= key[:-1]).all())
+
+
+def _verify(n_rows: int, most: int | None) -> None:
+    if most is not None and n_rows > most:
+        raise TooManyRowsError(f"a join has {n_rows:,} rows")
+
+
+def _paired(left: _Rows, left_index: Int64 | None, right: _Rows, right_index: Int64) -> _Rows:
+    """Rows side by side; columns that both have come from the left."""
+    others = _Rows({c: v for c, v in right.columns.items() if c not in left.columns}, right.n)
+    return _Rows({**left.take(left_index).columns, **others.take(right_index).columns}, len(right_index))
+
+
+def _antijoin(left: _Rows, right: _Rows) -> _Rows:
+    shared = _shared(left, right)
+    if not shared:
+        return left if right.n == 0 else left.take(np.empty(0, np.int64))
+    keys = _keys([left.columns[c] for c in shared], [right.columns[c] for c in shared])
+    left_key, right_key = keys.sides
+    if not keys.dense:
+        return left.keep(~np.isin(left_key, right_key))
+    absent = np.ones(keys.size, np.bool_)
+    absent[right_key] = False
+    return left.keep(absent[left_key])
+
+
+def _lookup(plan: Lookup, rows: _Rows, tables: Tables) -> _Rows:
+    *stored, value = tables[plan.table]
+    default = rows.value(plan.default)
     if not len(value):
-        return {**rows, plan.name: found}
-    if not key_columns:
-        return {**rows, plan.name: np.full(length, value[0], np.int64)}
-    wanted = [np.broadcast_to(np.asarray(_value(rows, k), np.int64), (length,)) for k in plan.key]
-    key, stored = _packed(wanted, [c.astype(np.int64, copy=False) for c in key_columns])
-    order = np.argsort(stored)
-    at = np.minimum(np.searchsorted(stored[order], key), len(stored) - 1)
-    hit = stored[order][at] == key
-    found[hit] = value[order][at][hit]
-    return {**rows, plan.name: found}
+        return _Rows({**rows.columns, plan.name: np.array(default)}, rows.n)
+    if not stored:
+        return _Rows({**rows.columns, plan.name: np.full(rows.n, value[0])}, rows.n)
+    key = _keys([rows.value(k) for k in plan.key], list(stored))
+    wanted, given = key.sides
+    if key.dense:
+        place = np.full(key.size, -1, np.int32)
+        place[given] = np.arange(len(given), dtype=np.int32)
+        at: Column = place[wanted]
+        hit = np.flatnonzero(at >= 0)
+    else:
+        order = np.argsort(given)
+        at = order[np.minimum(np.searchsorted(given, wanted, sorter=order), len(given) - 1)]
+        hit = np.flatnonzero(given[at] == wanted)
+    found = np.array(default, np.result_type(default, value))
+    found[hit] = value[at[hit]]
+    return _Rows({**rows.columns, plan.name: found}, rows.n)
 
 
-def _union(sources: list[dict[str, Int64]], columns: tuple[str, ...]) -> dict[str, Int64]:
+def _union(sources: list[_Rows], columns: tuple[str, ...]) -> _Rows:
     if not columns:
-        some = any(_length(s) for s in sources)
-        return {"": np.zeros(int(some), np.int64)}
-    rows = {c: np.concatenate([s[c] for s in sources]) for c in columns}
-    (key,) = _packed([rows[c] for c in columns])
-    _, index = np.unique(key, return_index=True)
-    return {**_take(rows, index), "": np.zeros(len(index), np.int64)}
+        return _Rows({}, int(any(s.n for s in sources)))
+    keys = _keys([np.concatenate([s.columns[c] for s in sources]) for c in columns])
+    (key,) = keys.sides
+    if keys.digits is None:
+        _, index = np.unique(key, return_index=True)
+        every = {c: np.concatenate([s.columns[c] for s in sources]) for c in columns}
+        return _Rows(every, len(key)).take(index)
+    if keys.dense:
+        present = np.zeros(keys.size, np.bool_)
+        present[key] = True
+        key = np.flatnonzero(present)
+    else:
+        key = np.unique(key)
+    return _Rows(dict(zip(columns, keys.columns(key), strict=True)), len(key))
 
 
-def _count(rows: dict[str, Int64], by: tuple[str, ...]) -> dict[str, Int64]:
+def _count(rows: _Rows, by: tuple[str, ...]) -> _Rows:
     if not by:
-        return {"count": np.array([_length(rows)], np.int64), "": np.zeros(1, np.int64)}
-    (key,) = _packed([rows[c] for c in by])
-    _, index, count = np.unique(key, return_index=True, return_counts=True)
-    taken = _take({c: rows[c] for c in by}, index)
-    return {**taken, "count": count.astype(np.int64), "": np.zeros(len(index), np.int64)}
-
-
-def joined(plans: list[Plan]) -> Plan:
-    """The join of plans from left to right."""
-    return reduce(Join, plans) if plans else One()
+        return _Rows({"count": np.array([rows.n], np.int64)}, 1)
+    keys = _keys([rows.columns[c] for c in by])
+    (key,) = keys.sides
+    if keys.digits is None:
+        _, index, count = np.unique(key, return_index=True, return_counts=True)
+        return _Rows({**{c: rows.columns[c][index] for c in by}, "count": count}, len(index))
+    if keys.dense:
+        every = np.bincount(key, minlength=keys.size)
+        key = np.flatnonzero(every)
+        count = every[key]
+    else:
+        key, count = np.unique(key, return_counts=True)
+    return _Rows({**dict(zip(by, keys.columns(key), strict=True)), "count": count}, len(key))

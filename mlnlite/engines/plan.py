@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 Column: TypeAlias = NDArray[np.int64] | NDArray[np.int32]
-Relation: TypeAlias = Mapping[str, NDArray[np.int64]]
-"""Columns of equal length, by name."""
+Relation: TypeAlias = Mapping[str, NDArray[Any]]
+"""Columns of integers of equal length, by name."""
 
 Tables: TypeAlias = Mapping[str, tuple[Column, ...]]
 """Stored tables: columns by position."""
@@ -142,7 +142,7 @@ def columns_of(plan: Plan) -> tuple[str, ...]:
 
 
 Run: TypeAlias = Callable[[Plan], Relation]
-"""Gives all rows of a plan as columns of int64, in any order."""
+"""Gives all rows of a plan as columns of integers of 32 or 64 bits, in any order."""
 
 
 class Engine(Protocol):

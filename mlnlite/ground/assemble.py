@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.ground.compile import strides
-from mlnlite.ground.merge import merged, merged_clauses
+from mlnlite.ground.merge import code_of, merged, merged_codes
 from mlnlite.ground.network import Clauses, Counts, Network, Tables
 from mlnlite.ground.residual import ClauseShape, CountShape, TableShape
 from mlnlite.ground.states import counts_of
@@ -36,7 +36,7 @@ class Piece:
 
     atoms: tuple[Int64, ...]
     shape: ClauseShape | TableShape | CountShape
-    row: Int64
+    row: NDArray[Any]
     count: Int64
 
 
@@ -53,8 +53,15 @@ class Part:
         """Number of groundings of each row."""
         total = self.decided_true + self.decided_false
         for piece in self.pieces:
-            total = total + np.bincount(piece.row, piece.count, len(total)).astype(np.int64)
+            total = total + sums_by(piece.row, piece.count, len(total))
         return total
+
+
+def sums_by(row: NDArray[Any], count: Int64, n_rows: int) -> Int64:
+    """Sums of counts for each row."""
+    if n_rows == 1:
+        return np.array([count.sum()], np.int64)
+    return np.bincount(row, count, n_rows).astype(np.int64)
 
 
 def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: Int64 | None) -> Network:
@@ -116,7 +123,7 @@ def distinct(numbers: Sequence[Int64]) -> Int64:
         return np.unique(np.concatenate(flat))
     seen = np.zeros(high - low + 1, np.bool_)
     for n in flat:
-        seen[n - low] = True
+        seen[n - low if low else n] = True
     return np.flatnonzero(seen) + low
 
 
@@ -126,9 +133,11 @@ def index_in(atoms: Int64) -> Index:
     if not len(atoms) or span > min(DENSEST, 16 * len(atoms) + 4096):
         return lambda numbers: np.searchsorted(atoms, numbers).astype(np.int32)
     low = atoms[0]
+    if span == len(atoms):
+        return lambda numbers: (numbers - low).astype(np.int32, copy=False)
     place = np.zeros(span, np.int32)
     place[atoms - low] = np.arange(len(atoms), dtype=np.int32)
-    return lambda numbers: place[numbers - low]
+    return lambda numbers: place[numbers - low if low else numbers]
 
 
 def known_atoms(predicate: Predicate, evidence: Evidence) -> Int64:
@@ -158,6 +167,8 @@ def atom_range(predicate: Predicate, evidence: Evidence) -> tuple[int, int]:
 def _with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
     """The atoms and the other open atoms of their blocks, and for each the number of its block's first atom, or -1."""
     blocks = np.full(len(atoms), -1, np.int64)
+    if all(p.value is None for p in evidence.predicates.values()):
+        return atoms, blocks
     for predicate in evidence.predicates.values():
         if predicate.value is None:
             continue
@@ -182,6 +193,9 @@ def _first_of_block(atoms: Int64, low: int, stride: int, size: int) -> Int64:
 
 def _variables(atoms: Int64, block: Int64, evidence: Evidence) -> tuple[Int32, Int32, Int32, NDArray[np.bool_]]:
     """Variable and value of each atom; cardinality of each variable and whether it is a block."""
+    if (block < 0).all():
+        single = np.arange(len(atoms), dtype=np.int32)
+        return single, np.ones_like(single), np.full_like(single, 2), np.zeros(len(atoms), np.bool_)
     owner = np.where(block >= 0, block, atoms)
     # a block's first atom may be a known one, and then is not among the atoms: owners are numbers of their own kind
     names, number = np.unique(owner * 2 + (block >= 0), return_inverse=True)
@@ -216,14 +230,13 @@ def _clauses(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Clauses
     for part, offset in zip(parts, first, strict=False):
         for piece in part.pieces:
             if isinstance(piece.shape, ClauseShape):
-                signs = [np.int32(1 if sign else -1) for sign in piece.shape.signs]
-                literals = [(index(a) + np.int32(1)) * sign for a, sign in zip(piece.atoms, signs, strict=True)]
-                key = (len(literals), piece.shape.negated)
-                gathered.setdefault(key, []).append((*literals, (piece.row + offset).astype(np.int32), piece.count))
+                codes = [code_of(index(a), s) for a, s in zip(piece.atoms, piece.shape.signs, strict=True)]
+                key = (len(codes), piece.shape.negated)
+                gathered.setdefault(key, []).append((*codes, (piece.row + offset).astype(np.int32), piece.count))
     blocks = []
     for (_, negated), items in sorted(gathered.items()):
-        *literals, weight, count = _joined(items)
-        blocks.append(Clauses(*merged_clauses(literals, weight, count), negated))
+        *codes, weight, count = _joined(items)
+        blocks.append(Clauses(*merged_codes(codes, weight, count), negated))
     return tuple(blocks)
 
 

@@ -20,6 +20,7 @@ from mlnlite.ground.groups import Group
 from mlnlite.ground.residual import Decided, atoms_in, equalities_in, truth_table
 from mlnlite.ground.states import NONE, reduced
 from mlnlite.ground.tables import KNOWN_FALSE, KNOWN_TRUE
+from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import Argument, AtomRef, Equal, Expression, Not
 from mlnlite.model.propositional import FALSE, TRUE, Cube, Proposition, simplified
 
@@ -29,8 +30,14 @@ Bool = NDArray[np.bool_]
 MOST_STATES = 1 << 22
 """States of a formula: the product of what its counts and its other atoms can be."""
 
-AT_ONCE = 1 << 21
+AT_ONCE = 1 << 19
 """Ground atoms that are looked up at once."""
+
+WIDEST_CASE = 9
+"""Atoms and equalities of a case."""
+
+DENSEST = 1 << 24
+"""Atoms whose status an array holds."""
 
 
 def plain_cubes(cubes: tuple[Cube, ...]) -> tuple[Cube, ...]:
@@ -172,18 +179,18 @@ def _literal(case: Expression) -> tuple[int | None, bool]:
 def _case_literal(case: Expression, rows: Relation, numbers: Int64) -> tuple[Int64, Bool] | None:
     """The literal that each row leaves of a case: atoms and signs, shapes (n, 1); None if some row leaves more."""
     n = len(numbers)
-    code = np.zeros(n, np.int64)
-    propositions: list[Proposition] = [
-        *map(AtomRef, sorted(atoms_in(case))),
-        *dict.fromkeys(equalities_in(case)),
-    ]
+    propositions: list[Proposition] = [*map(AtomRef, sorted(atoms_in(case))), *dict.fromkeys(equalities_in(case))]
+    if len(propositions) > WIDEST_CASE:
+        return None
+    code = np.zeros(n, np.int16)
     for p in propositions:
+        code *= 3
         if isinstance(p, AtomRef):
-            code = code * 3 + np.maximum(-numbers[:, p.index], 0)
+            code += np.clip(-numbers[:, p.index], 0, 2).astype(np.int16)
         else:
-            code = code * 3 + np.where(_holds(p, rows, n), -KNOWN_TRUE, -KNOWN_FALSE)
+            code += np.where(_holds(p, rows, n), np.int16(-KNOWN_TRUE), np.int16(-KNOWN_FALSE))
     atoms, sign = np.empty(n, np.int64), np.ones(n, np.bool_)
-    for value in np.unique(code).tolist():
+    for value in np.flatnonzero(np.bincount(code)).tolist():
         mine = code == value
         known: dict[Proposition, bool] = {}
         for p in reversed(propositions):
@@ -225,15 +232,25 @@ def _numbers(source: Source, rows: Relation, n: int) -> Int64:
         by_predicate.setdefault(schema.predicate, []).append(i)
     numbers = bound @ factor + constant
     for name, atoms in by_predicate.items():
-        facts, mine = evidence.facts[name], numbers[:, atoms]
-        known = evidence.atom_number(name, facts.arguments)
-        order = np.argsort(known)
-        at = np.minimum(np.searchsorted(known[order], mine), max(len(known) - 1, 0))
-        if evidence.predicates[name].closed:
-            numbers[:, atoms] = KNOWN_FALSE
-        if len(known):
-            hit = known[order][at] == mine
-            numbers[:, atoms] = np.where(
-                hit, np.where(facts.truth[order][at], KNOWN_TRUE, KNOWN_FALSE), numbers[:, atoms]
-            )
+        numbers[:, atoms] = _known(evidence, name, numbers[:, atoms])
     return numbers
+
+
+def _known(evidence: Evidence, predicate: str, numbers: Int64) -> Int64:
+    """Numbers of atoms of a predicate with `KNOWN_TRUE` or `KNOWN_FALSE` in place of those that are known."""
+    facts = evidence.facts[predicate]
+    known = evidence.atom_number(predicate, facts.arguments)
+    value = np.where(facts.truth, KNOWN_TRUE, KNOWN_FALSE)
+    low, high = int(numbers.min(initial=0)), int(numbers.max(initial=0)) + 1
+    inside = (known >= low) & (known < high)
+    known, value = known[inside], value[inside]
+    if high - low <= DENSEST:
+        status = np.zeros(high - low, np.int8)
+        status[known - low] = value
+        found = status[numbers - low]
+    else:
+        order = np.argsort(known)
+        at = order[np.minimum(np.searchsorted(known, numbers, sorter=order), max(len(known) - 1, 0))]
+        found = np.where(known[at] == numbers, value[at], 0) if len(known) else np.zeros(numbers.shape, np.int64)
+    unknown = KNOWN_FALSE if evidence.predicates[predicate].closed else numbers
+    return np.where(found == 0, unknown, found)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mlnlite.engines.choose import engine_for
 from mlnlite.engines.plan import Column, Engine, Relation, Run, Tables
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
-from mlnlite.ground.assemble import Part, Piece, network_of
+from mlnlite.ground.assemble import Part, Piece, network_of, sums_by
 from mlnlite.ground.compile import Compiled, Source, atom_column, bindings, column, compiled, with_atom
 from mlnlite.ground.counting import counting_groups, counting_plan, plain_cubes
 from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, verify
@@ -58,7 +58,7 @@ def ground(
         LimitReached: if a ground formula has no sensible representation, or a template needs more than the limits.
     """
     model, evidence, tables = prepared(model, evidence)
-    run = (engine or engine_for(tables, memory=limits.memory)).load(tables)
+    run = (engine or engine_for(memory=limits.memory)).load(tables)
     parts = []
     for i, template in enumerate(model.templates):
         with _blamed(template):
@@ -158,7 +158,9 @@ def row_tables(model: Model) -> dict[str, tuple[Column, ...]]:
 def source_of(index: int, template: Template, evidence: Evidence, world: str | None = None) -> Source:
     """What plans of an (expanded) template draw on: its formula without quantifiers, and what is known."""
     assert template.rows is not None
-    formula = without_quantifiers(template.formula, _constants(evidence), _comparisons(evidence))
+    formula = template.formula
+    if any(v.bound for v in formula.variables):
+        formula = without_quantifiers(formula, _constants(evidence), _comparisons(evidence))
     return Source(formula, evidence, template.keys, f"rows:{index}", len(template.rows), world)
 
 
@@ -285,19 +287,22 @@ def _constant(source: Source, template: Template, *, truth: bool) -> Part:
 def _part(source: Source, plan: Compiled, rows: Relation, groups: list[Group], *, lists_true: bool) -> Part:
     """The pieces of a template, and how many groundings of each of its rows evidence decides."""
     n_rows = len(next(iter(rows.values()))) if rows else 1
-    row = rows["row"] if source.tabled else np.zeros(n_rows, np.int64)
-    count = rows["count"] if plan.counted else np.ones(n_rows, np.int64)
+    row = rows["row"] if source.tabled else None
+    count = rows["count"] if plan.counted else None
     total = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
     listed = {True: np.zeros(source.n_rows, np.int64), False: np.zeros(source.n_rows, np.int64)}
     open_ = np.zeros(source.n_rows, np.int64)
     pieces = []
     for group in groups:
-        sums = np.bincount(row[group.index], count[group.index], source.n_rows).astype(np.int64)
+        n = n_rows if isinstance(group.index, slice) else len(group.index)
+        own_row = np.broadcast_to(np.int32(0), n) if row is None else row[group.index]
+        own_count = np.broadcast_to(np.int64(1), n) if count is None else count[group.index]
+        sums = sums_by(own_row, own_count, source.n_rows)
         if isinstance(group.shape, Decided):
             listed[group.shape.truth] += sums
             continue
         open_ += sums
-        pieces.append(Piece(group.atoms, group.shape, row[group.index], count[group.index]))
+        pieces.append(Piece(group.atoms, group.shape, own_row, own_count))
     if lists_true:
         decided_true, decided_false = listed[True], total - open_ - listed[True]
     else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any as Any_
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,11 @@ from mlnlite.ground.tables import KNOWN_TRUE
 from mlnlite.model.formulas import All, Any, AtomRef, Expression, Formula, Iff, Not
 from mlnlite.model.propositional import Proposition, simplified
 
+Int8 = NDArray[np.int8]
 Int64 = NDArray[np.int64]
+
+FEW = 81
+"""Kinds of rows that are looked for one by one, without sorting."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +43,19 @@ def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
     """
     n_rows = len(next(iter(rows.values()))) if rows else 1
     features = _features(formula, plan, rows)
-    code, base = np.zeros(n_rows, np.int64), 1
+    code: NDArray[Any_] = np.zeros(n_rows, np.int8)
+    base = 1
     for column in features.values():
         if len(column) and (column != column[0]).any():
             if base > 2**61 // 3:
-                code = np.unique(code, return_inverse=True)[1].reshape(-1).astype(np.int64)
+                code = np.unique(code, return_inverse=True)[1].reshape(-1)
                 base = int(code.max()) + 1
-            code, base = code * 3 + column, base * 3
+            code = code.astype(np.min_scalar_type(-3 * base), copy=False)
+            code *= 3
+            code += column
+            base *= 3
     groups = []
-    for index in _equal_rows(code):
+    for index in _equal_rows(code, base):
         first = 0 if isinstance(index, slice) else index[0]
         known, merged = _meaning({key: int(column[first]) for key, column in features.items()})
         body = simplified(renamed(formula.body, merged), {**plan.known, **known})
@@ -56,26 +65,32 @@ def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
     return groups
 
 
-def _equal_rows(code: Int64) -> Sequence[Int64 | slice]:
+def _equal_rows(code: NDArray[Any_], base: int) -> Sequence[Int64 | slice]:
     if len(code) == 0:
         return []
-    if (code == code[0]).all():
+    if base == 1:
         return [slice(None)]
+    if base <= FEW:
+        masks = (code == value for value in range(base))
+        return [index for mask in masks if len(index := np.flatnonzero(mask))]
     order = np.argsort(code, kind="stable")
     return list(np.split(order, np.flatnonzero(np.diff(code[order])) + 1))
 
 
-def _features(formula: Formula, plan: Compiled, rows: Relation) -> dict[Proposition | tuple[int, int], Int64]:
+def _features(formula: Formula, plan: Compiled, rows: Relation) -> dict[Proposition | tuple[int, int], Int8]:
     """Small numbers for each row: 0 unknown, 1 true, 2 false for a proposition; 1 for a pair of atoms that coincide."""
-    features: dict[Proposition | tuple[int, int], Int64] = {}
+    features: dict[Proposition | tuple[int, int], Int8] = {}
     atoms = {i: rows[atom_column(i)] for i in plan.atoms}
     for i, column in atoms.items():
-        features[AtomRef(i)] = np.where(column >= 0, 0, -column).astype(np.int64)
+        if column.min(initial=0) < 0:
+            features[AtomRef(i)] = np.negative(np.clip(column, -2, 0)).astype(np.int8)
     for i, equality in enumerate(plan.equalities):
-        features[equality] = np.where(rows[equality_column(i)] == 0, 1, 2).astype(np.int64)
+        features[equality] = np.where(rows[equality_column(i)] == 0, np.int8(1), np.int8(2))
     for i, j in combinations(plan.atoms, 2):
         if formula.atoms[i].predicate == formula.atoms[j].predicate:
-            features[i, j] = ((atoms[i] == atoms[j]) & (atoms[i] >= 0)).astype(np.int64)
+            equal = (atoms[i] == atoms[j]) & (atoms[i] >= 0)
+            if equal.any():
+                features[i, j] = equal.astype(np.int8)
     return features
 
 

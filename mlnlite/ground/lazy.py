@@ -86,7 +86,7 @@ def violations(
     if certain is not None:
         source = replace(source, excluded=_CERTAIN)
         tables |= {f"{name}{_CERTAIN}": columns for name, columns in tables_of(certain).items()}
-    run = (engine or engine_for(tables)).load(tables)
+    run = (engine or engine_for()).load(tables)
     pieces = []
     for cube in cubes(source.formula.body, False):
         literals = [(p.index, truth) for p, truth in cube.items() if isinstance(p, AtomRef)]

@@ -22,10 +22,19 @@ def merged_clauses(literals: Sequence[Int32], weight: Int32, count: Int64) -> Fa
         weight: shape (n,).
         count: shape (n,).
     """
-    codes = _sorted_rows([(np.abs(c) << 1) | (c < 0) for c in literals])
-    rows, weight, count = merged(codes, weight, count)
-    atoms = rows >> 1
-    return _locked(np.where(rows & 1, -atoms, atoms), weight, count)
+    return merged_codes([(np.abs(c) << 1) | (c < 0) for c in literals], weight, count)
+
+
+def code_of(index: Int32, positive: bool) -> Int32:
+    """The codes of literals of the atoms at some indices: twice the literal's number, and 1 more if it is negative."""
+    return np.asarray((index << np.int32(1)) + np.int32(2 if positive else 3))
+
+
+def merged_codes(codes: Sequence[Int32], weight: Int32, count: Int64) -> Factors:
+    """As `merged_clauses`, of the codes of literals; see `code_of`."""
+    rows, weight, count = merged(_sorted_rows(list(codes)), weight, count)
+    sign = np.int32(1) - ((rows & np.int32(1)) << np.int32(1))
+    return _locked((rows >> np.int32(1)) * sign, weight, count)
 
 
 def merged(columns: Sequence[Int32], weight: Int32, count: Int64) -> Factors:
@@ -35,23 +44,32 @@ def merged(columns: Sequence[Int32], weight: Int32, count: Int64) -> Factors:
         return _merged_by_columns(columns, weight, count)
     key = weight.astype(np.int64)
     for column in columns:
-        key = (key << bits) | column
-    if len(count) and int(count.max()) == 1:
-        key.sort()
-        starts = np.flatnonzero(np.diff(key, prepend=key[0] - 1))
-        count = np.diff(starts, append=len(key))
-    else:
-        order = np.argsort(key)
-        key = key[order]
-        starts = np.flatnonzero(np.diff(key, prepend=key[0] - 1 if len(key) else 0))
-        count = np.add.reduceat(count[order], starts) if len(starts) else count
-    if len(starts) < len(key):
-        key = key[starts]
+        key <<= bits
+        key |= column
+    key, count = _added(key, count)
     rows = np.empty((len(key), len(columns)), np.int32)
     for i in reversed(range(len(columns))):
         rows[:, i] = key & ((1 << bits) - 1)
         key >>= bits
     return _locked(rows, key.astype(np.int32), count)
+
+
+def _added(key: Int64, count: Int64) -> tuple[Int64, Int64]:
+    """The keys in rising order, each once, and the sums of their counts. The keys given may be changed."""
+    if len(key) == 0:
+        return key, count
+    plain = int(count.max()) == 1
+    if not plain:
+        order = np.argsort(key)
+        key, count = key[order], count[order]
+    elif not (key[1:] >= key[:-1]).all():
+        key.sort()
+    new = np.ones(len(key), np.bool_)
+    np.not_equal(key[1:], key[:-1], out=new[1:])
+    if new.all():
+        return key, np.array(count)
+    starts = np.flatnonzero(new)
+    return key[starts], np.diff(starts, append=len(key)) if plain else np.add.reduceat(count, starts)
 
 
 def _merged_by_columns(columns: Sequence[Int32], weight: Int32, count: Int64) -> Factors:

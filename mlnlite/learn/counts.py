@@ -79,7 +79,7 @@ def _counted(source: Source, case: Case, target: int, sign: int, first: int, run
     if others is None:
         return []
     plan = _plan(source, case, others, schema)
-    rows = run(plan)
+    rows = {name: column.astype(np.int64, copy=False) for name, column in run(plan).items()}
     weight = rows["row"] + first if source.tabled else np.full(len(rows["count"]), first, np.int64)
     change = rows["count"] * (sign if truth else -sign)
     return [Entries(rows["database"], rows["atom"], weight, change)]

@@ -149,7 +149,7 @@ def pseudo_listed(model: Model, databases: Evidence, targets: frozenset[str], en
     """The choices of the pseudo-likelihood one by one; the model is expanded."""
     evidence = closed(databases, databases.predicates)
     tables = {**tables_of(evidence), **row_tables(model)}
-    found = entries(model.templates, evidence, (engine or engine_for(tables)).load(tables), targets)
+    found = entries(model.templates, evidence, (engine or engine_for()).load(tables), targets)
     return listed(found, evidence, sum(len(t.weights) for t in model.templates))
 
 

@@ -164,6 +164,10 @@ def _quantified(writing: _Writing, expression: Exists | Count, binding: Binding)
         return FALSE
     if low == 0 and high >= len(left):
         return TRUE
+    if low == 1 and high >= len(left):
+        parts = (case.operands if isinstance(case, Any) else (case,) for case in left)
+        left = list(dict.fromkeys(p for operands in parts for p in operands))
+        high = len(left)
     writing.counted.append(Counted(tuple(left), low, min(high, len(left))))
     return AtomRef(~(len(writing.counted) - 1))
 
