@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mlnlite.ground.network import Network as Network
     from mlnlite.infer.answer import map_state as map_state
     from mlnlite.infer.answer import marginal as marginal
+    from mlnlite.infer.joint import joint as joint
     from mlnlite.infer.scored import Score as Score
     from mlnlite.infer.scored import score as score
     from mlnlite.infer.session import Session as Session
@@ -77,6 +78,7 @@ _HOMES = {
     "Network": "mlnlite.ground.network",
     "map_state": "mlnlite.infer.answer",
     "marginal": "mlnlite.infer.answer",
+    "joint": "mlnlite.infer.joint",
     "Score": "mlnlite.infer.scored",
     "score": "mlnlite.infer.scored",
     "Session": "mlnlite.infer.session",

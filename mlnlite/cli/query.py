@@ -71,6 +71,7 @@ class _Options(TypedDict):
     chains: int
     gap: float
     margins: bool
+    joint: bool
     width_limit: int | None
     dialect: Dialect | None
     format: Literal["text", "json", "csv"]
@@ -86,6 +87,7 @@ class _Options(TypedDict):
     metavar="QUERY",
     help="Predicates, ground atoms or formulas, comma separated. `--task map` without it shows all unknown atoms.",
 )
+@click.option("--joint", is_flag=True, help="A joint table of what is asked, at most 8 atoms or formulas.")
 @click.option(
     "--task", type=click.Choice(["marginal", "map"]), default="marginal", show_default=True, help="What to ask."
 )
@@ -166,7 +168,8 @@ def _answer(model: Model, evidence: Evidence, items: list[str], options: _Option
             gap=options["gap"],
             margins=options["margins"],
         )
-    return ml.marginal(
+    ask = ml.joint if options["joint"] else ml.marginal
+    return ask(
         model,
         evidence,
         items,
@@ -185,6 +188,8 @@ def _verify(options: _Options, items: list[str]) -> None:
     tasks = _METHODS[options["method"]]
     if options["task"] not in tasks:
         raise click.UsageError(f"--method {options['method']} is for --task {tasks[0]}")
+    if options["task"] == "map" and options["joint"]:
+        raise click.UsageError("--joint is for --task marginal")
     if options["task"] == "map" and options["width_limit"] is not None:
         raise click.UsageError("--width-limit is for --task marginal; --task map takes --time-limit")
     if options["task"] == "marginal" and not items:
