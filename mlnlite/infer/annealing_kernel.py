@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from mlnlite.infer.compiled import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def sweeps(start, begin, cell, amount, missing, world, best, temperatures, value, top, rng):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, PLR0913
     """As many moves as there are variables at each temperature; returns the value of `world` and that of `best`.
 

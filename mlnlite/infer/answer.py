@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.plan import Engine
-from mlnlite.errors import LimitReached, QueryMistake
+from mlnlite.errors import QueryMistake
 from mlnlite.ground.ground import ground
 from mlnlite.ground.groups import renamed
 from mlnlite.ground.network import Network
 from mlnlite.infer.approach import Approach, MarginalMethod
-from mlnlite.infer.cells import LIFTED, WORTH_LIFTING, fragment_of, n_lifted_atoms
 from mlnlite.infer.ladder import solve
+from mlnlite.infer.liftable import lifted_marginals
 from mlnlite.infer.marginal import WIDTH_LIMIT
 from mlnlite.infer.marginals import EVIDENCE, marginals_from
 from mlnlite.infer.query import Question, atom_numbers, question_of
@@ -79,7 +79,8 @@ def marginal(  # noqa: PLR0913
     """
     approach = Approach(method, width_limit, precision, time_limit, chains, seed)
     if method in ("auto", "lifted") and query is not None:
-        lifted = lifted_marginals(model, evidence, query, closed_world, must=method == "lifted")
+        known = evidence if closed_world == "all" else _closed(evidence, closed_world, frozenset())
+        lifted = lifted_marginals(model, known, query, others_closed=closed_world == "all", must=method == "lifted")
         if lifted is not None:
             return lifted
     asked = _ask(model, evidence, query, closed_world, engine)
@@ -201,60 +202,6 @@ def map_state_for(  # noqa: PLR0913
             network.n_atoms, network.n_factors, len(best.component_status), best.largest_table, seconds
         ),
         block=_blocks(network, index, len(index)),
-    )
-
-
-def lifted_marginals(
-    model: Model,
-    evidence: Evidence,
-    query: str | Sequence[str],
-    closed_world: str | Iterable[str],
-    *,
-    must: bool,
-) -> Marginals | None:
-    """Answers without grounding, where a model is in the two-variable fragment.
-
-    Args:
-        model: as in `marginal`.
-        evidence: as in `marginal`.
-        query: as in `marginal`.
-        closed_world: as in `marginal`.
-        must: say why it is not possible, not None; and do it even if grounding would be cheap.
-
-    Raises:
-        QueryMistake: it is not possible.
-        LimitReached: it would take too long.
-    """
-    start = perf_counter()
-    known = evidence if closed_world == "all" else _closed(evidence, closed_world, frozenset())
-    fragment = "worlds are closed but for what is asked" if closed_world == "all" else fragment_of(model, known)
-    if isinstance(fragment, str) or (not must and n_lifted_atoms(fragment, known) < WORTH_LIFTING):
-        if must and isinstance(fragment, str):
-            raise QueryMistake(f"no lifted inference for this model: {fragment}")
-        return None
-    question = question_of(query, model, known)
-    if question.formulas or not question.predicates <= {*fragment.unary, *fragment.binary}:
-        if must:
-            raise QueryMistake("lifted inference answers atoms of predicates that formulas mention, nothing else")
-        return None
-    from mlnlite.infer.lifted import classes_of, lifted_probabilities
-
-    try:
-        classes = classes_of(fragment, known)
-    except LimitReached:
-        if must:
-            raise
-        return None
-    probability, log_z = lifted_probabilities(classes, known, question.atoms)
-    n, seconds = len(probability), {"infer": perf_counter() - start}
-    return Marginals(
-        names=tuple(_texts(known, question.atoms)),
-        probabilities=probability,
-        methods=(LIFTED,) * n,
-        exact=np.ones(n, np.bool_),
-        error=np.zeros(n),
-        log_z=log_z,
-        statistics=Statistics(n_lifted_atoms(fragment, known), seconds=seconds),
     )
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import logging
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
 from pathlib import Path
-from threading import Timer
-
-PATIENCE = 1.5
-"""Seconds of compiling after which it is announced."""
+from typing import Any
 
 
 def prepare_cache() -> None:
@@ -29,14 +27,30 @@ def _writable(folder: Path) -> bool:
     return os.access(existing, os.W_OK | os.X_OK)
 
 
-@contextmanager
-def announced() -> Iterator[None]:
-    """Says what takes so long, through the logger `mlnlite`, which by default writes to standard error."""
-    logger = logging.getLogger("mlnlite")
-    timer = Timer(PATIENCE, logger.warning, ["compiling the sampler; this is done once and kept"])
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
+def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401
+    """A function that Numba compiles when it is first called and keeps in a cache; a user hears of it if it does."""
+    prepare_cache()
+    from numba import njit
+
+    _announce_compiling()
+    return njit(cache=True, nogil=True)(function)
+
+
+@cache
+def _announce_compiling() -> None:
+    """Says once what takes so long, through the logger `mlnlite`, which by default writes to standard error."""
+    numba_events: Any = import_module("numba.core.event")
+
+    class Announcer(numba_events.Listener):  # type: ignore[misc]
+        """Hears when Numba begins to compile something that its cache does not hold."""
+
+        def on_start(self, event: object) -> None:
+            """Says so, the first time."""
+            if say:
+                logging.getLogger("mlnlite").warning(say.pop())
+
+        def on_end(self, event: object) -> None:
+            """Nothing to say."""
+
+    say = ["compiling fast code for the first time; this is kept for later"]
+    numba_events.register("numba:compile", Announcer())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -11,6 +11,7 @@ from mlnlite.errors import Contradiction, Diagnostic
 from mlnlite.ground.network import Network
 from mlnlite.infer.counting import count_clauses
 from mlnlite.infer.potentials import decided_false
+from mlnlite.model.templates import Template
 
 
 def contradiction(network: Network) -> Contradiction:
@@ -20,9 +21,17 @@ def contradiction(network: Network) -> Contradiction:
     after the other can make it. (Formulas of which evidence alone makes a grounding false are named without search.)
     """
     weights = decided_false(network).tolist()
-    decided = bool(weights)
     templates = sorted({int(network.template[w]) for w in weights or _core(network)})
-    named = [network.model.templates[t] for t in templates]
+    return contradiction_of([network.model.templates[t] for t in templates], decided=bool(weights))
+
+
+def contradiction_of(named: Sequence[Template], *, decided: bool = False) -> Contradiction:
+    """The error that names hard formulas.
+
+    Args:
+        named: which exclude each other.
+        decided: evidence alone makes a grounding of each of them false.
+    """
     if decided:
         what = "the evidence makes it false, and it is hard"
     elif len(named) > 1:

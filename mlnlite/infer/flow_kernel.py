@@ -7,10 +7,11 @@ that it cuts off look for a new parent. The trees stay from one path to the next
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from mlnlite.infer.compiled import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def push(begin, head, sister, room, terminal):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, C901, PLR0915
     """Value of a maximum flow, and which nodes the source reaches in the end.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mlnlite.ground.network import Bool, Float, Int32
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def sweep(  # noqa: C901
     f: Factors, state: Int32, true: Int32, uniform: Float, beta: float, total: Float, watched: Int32, seen: Bool
 ) -> None:

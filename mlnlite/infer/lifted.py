@@ -20,6 +20,8 @@ from mlnlite.model.evidence import Evidence
 
 MOST_TERMS = 20_000_000
 _NEVER = -1e30
+IMPOSSIBLE = _NEVER / 2
+"""A log-weight below this is that of no world."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +105,7 @@ def _ways(n: int, own: Float) -> Float:
     ways = np.full(last.shape, -np.inf)
     counts = np.vstack([index, last])[:, last >= 0]
     worth = np.where(counts > 0, counts * np.where(np.isneginf(own), _NEVER, own)[:, None], 0.0).sum(axis=0)
-    ways[last >= 0] = np.where(worth < _NEVER / 2, -np.inf, worth + gammaln(n + 1) - gammaln(counts + 1).sum(axis=0))
+    ways[last >= 0] = np.where(worth < IMPOSSIBLE, -np.inf, worth + gammaln(n + 1) - gammaln(counts + 1).sum(axis=0))
     return ways.reshape(shape)
 
 
@@ -138,7 +140,7 @@ def lifted_probabilities(classes: Classes, evidence: Evidence, atoms: Int64) -> 
     """
     fragment = classes.fragment
     log_z = log_sum(classes)
-    if np.isneginf(log_z) or log_z < _NEVER / 2:
+    if log_z < IMPOSSIBLE:
         raise Contradiction([Diagnostic("E405", "no world satisfies the hard formulas together with the evidence")])
     found = np.full(len(atoms), np.nan)
     n = len(evidence.types[fragment.type].constants)

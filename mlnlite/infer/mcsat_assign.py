@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_slice import Slice
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def assign(f: Factors, s: Slice, variable: int, atom: int, sign: int) -> bool:
     """Makes one atom of a variable true and its other atoms that are not fixed false.
 

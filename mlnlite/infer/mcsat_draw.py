@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mlnlite.ground.network import Bool, Float, Int32
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_list import list_worlds
 from mlnlite.infer.mcsat_reach import reach
@@ -13,7 +13,7 @@ from mlnlite.infer.mcsat_slice import Slice
 from mlnlite.infer.mcsat_walk import walk
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def draw(f: Factors, s: Slice, owner: Int32, uniform: Float, true: Int32, exact: Bool) -> None:
     """Draws all variables that a slice leaves open.
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mlnlite.ground.network import Bool, Int32, Int64
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_slice import Slice
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fix(f: Factors, s: Slice, owner: Int32, choices: Int32, atom: int, truth: bool, changed: Int64, waits: Bool) -> int:
     """Fixes an atom.
 

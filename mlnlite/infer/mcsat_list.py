@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from mlnlite.ground.network import Int32
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_assign import assign
 from mlnlite.infer.mcsat_slice import Slice
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def list_worlds(f: Factors, s: Slice, order: Int32, trial: Int32, target: int, steps: int) -> int:
     """Counts the worlds of a part by depth-first search, or goes to one of them.
 

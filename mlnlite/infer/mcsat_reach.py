@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mlnlite.ground.network import Bool, Int32
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_slice import Slice
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def reach(f: Factors, s: Slice, owner: Int32, root: int, reached: Bool, asked: Bool, order: Int32) -> int:
     """The variables that hang together with one of them through factors that the slice could still violate.
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mlnlite.ground.network import Bool, Float, Int32, Int64
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 
 
@@ -40,7 +40,7 @@ def empty_slice(factors: Factors) -> Slice:
     return Slice(np.empty(n), counts[0], counts[1], np.empty(n, np.bool_), counts[2], counts[3], fixed)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def cut(f: Factors, s: Slice, state: Int32, uniform: Float, queue: Int64) -> int:
     """Draws the slice: the log-weight of each factor may not fall below a random level under its present one.
 

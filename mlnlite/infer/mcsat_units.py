@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mlnlite.ground.network import Int32, Int64
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_fix import fix
 from mlnlite.infer.mcsat_slice import Slice
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def propagate(f: Factors, s: Slice, owner: Int32, queue: Int64, n_queued: int) -> None:
     """Fixes all atoms that some factor forces, until nothing more follows.
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from mlnlite.ground.network import Float, Int32
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_assign import assign
 from mlnlite.infer.mcsat_slice import Slice
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def walk(f: Factors, s: Slice, order: Int32, uniform: Float, true: Int32) -> None:
     """Gives each variable of a part in turn a value, uniformly among those that the slice allows given all others.
 

@@ -10,7 +10,6 @@ import numpy as np
 from mlnlite.ground.network import Bool, Float, Float32, Int64, Network
 from mlnlite.ground.patterns import with_counts
 from mlnlite.infer.approach import PATIENCE, Sampler
-from mlnlite.infer.compiled import announced, prepare_cache
 from mlnlite.infer.deadline import Deadline, in_seconds, interruptible
 from mlnlite.infer.diagnostics import jeffreys
 from mlnlite.infer.factors import Factors, factors_of
@@ -98,7 +97,6 @@ def sample(
         Contradiction: no world satisfies the hard formulas.
         QueryMistake: a weight is not known.
     """
-    prepare_cache()
     deadline = in_seconds(PATIENCE if effort.time_limit is None else effort.time_limit)
     factors = factors_of(with_counts(network), variables)
     chosen = sampler or best_sampler(factors)
@@ -135,8 +133,6 @@ def _run(
     rng = np.random.default_rng(effort.seed)
     worlds = start_worlds(network, effort.n_chains, rng)[:, factors.atom]
     run = new_run(network, factors, worlds, asked, sampler, rng)
-    with announced():
-        run.draws(run.chains[0], 1, run.watched.atoms, run.even[0].copy())
     for chain, even in zip(run.chains, run.even, strict=True):
         if not deadline.is_over:
             run.draws(chain, _WARM_UP, run.watched.atoms, even)

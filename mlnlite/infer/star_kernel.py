@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from mlnlite.infer.compiled import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def grow(begin, other, excuse, clause, value, least, most):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201
     """From each literal: adds the literal that gains most, its value less the excuses, as long as there is a gain.
 
@@ -54,7 +55,7 @@ def grow(begin, other, excuse, clause, value, least, most):  # type: ignore[no-u
     return members, clauses, above
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def pick(order, begin, column, n_columns, most):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201
     """Which rows to take, in some order, if each column is to be in no more than `most` of them; shape (n,).
 

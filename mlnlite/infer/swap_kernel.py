@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mlnlite.ground.network import Float, Int32
+from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def swap(f: Factors, state: Int32, true: Int32, groups: Int32, owner: Int32, uniform: Float, beta: float) -> None:
     """Where exactly one atom of a group is true, draws which one, given all other atoms.
 

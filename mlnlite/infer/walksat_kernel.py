@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from mlnlite.infer.compiled import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def walk(start, begin, cell, first, literal, amount, owner, missing, world, best, unpaid, place, last, n_unpaid, steps, noise, tabu, now, value, top, rng):  # type: ignore[no-untyped-def]  # fmt: skip  # noqa: ANN001, ANN201, C901, E501, PLR0913
     """Steps: take a cell that costs, at random, and change one of its variables so that it does not.
 

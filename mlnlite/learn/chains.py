@@ -10,7 +10,6 @@ from scipy import sparse
 
 from mlnlite.ground.network import Network
 from mlnlite.ground.patterns import with_counts
-from mlnlite.infer.compiled import prepare_cache
 from mlnlite.infer.factors import factors_of
 from mlnlite.infer.gibbs import gibbs_draws, start
 from mlnlite.infer.mcsat import jump
@@ -41,7 +40,6 @@ def new_chains(network: Network, n_chains: int, random: np.random.Generator) -> 
     Raises:
         Contradiction: if there is none.
     """
-    prepare_cache()
     return Chains(with_counts(network), start_worlds(network, n_chains, random))
 
 

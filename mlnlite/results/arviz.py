@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -28,9 +29,9 @@ def inference_data(names: Sequence[str], draws: Sequence[Rows], traces: Mapping[
     if not draws:
         raise QueryMistake("nothing was sampled", hint="every probability is exact; `to_frame` has them")
     try:
-        import arviz
+        arviz: Any = import_module("arviz")
     except ImportError as error:
-        raise MissingPart("ArviZ is not installed", hint="pip install arviz") from error
+        raise MissingPart("ArviZ is not installed", hint="pip install 'mlnlite[arviz]'") from error
     n = min(series.shape[1] for _, series in draws)
     posterior = np.concatenate([series[:, -n:] for _, series in draws], axis=2)
     sampled = [names[i] for rows, _ in draws for i in rows.tolist()]

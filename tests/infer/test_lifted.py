@@ -96,3 +96,25 @@ def test_says_why_not(text, facts, reason):
     evidence = ml.evidence_from_text(people(3) + facts, model=model)
     with pytest.raises(ml.QueryMistake, match=reason):
         ml.marginal(model, evidence, ["Smokes"], method="lifted")
+
+
+def test_formulas_in_conflict_are_named():
+    """Some friends must smoke, none may; that all have cancer is beside the point."""
+    text = """Smokes(person)
+Cancer(person)
+Friends(person, person)
+Friends(x, y) ^ Smokes(x) => Smokes(y).
+Friends(x, x) v Smokes(x).
+!Smokes(x).
+!Friends(x, y) v x != y.
+Cancer(x).
+-0.3 Friends(x, y)
+"""
+    model = ml.model_from_text(text)
+    evidence = ml.evidence_from_text(people(30), model=model)
+    with pytest.raises(ml.Contradiction) as caught:
+        ml.marginal(model, evidence, "Cancer", method="lifted")
+    named = [d.message.partition(":")[0] for d in caught.value.diagnostics]
+    assert named == ["formula 2", "formula 3", "formula 4"]
+    with pytest.raises(ml.Contradiction, match="these 3 hard formulas"):
+        ml.marginal(model, evidence, "Cancer", method="exact")

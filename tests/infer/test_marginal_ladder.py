@@ -1,6 +1,7 @@
 """What is too wide is sampled, and the result says so."""
 
 import sys
+from importlib.util import find_spec
 from types import SimpleNamespace
 
 import numpy as np
@@ -73,6 +74,21 @@ def test_arviz_of_both_generations(monkeypatch, sampled, version):
     n_atoms = len(data["coords"]["atom"])
     assert data["posterior"]["probability"].shape[::2] == (4, n_atoms)
     assert data["coords"]["atom"][0] == "Smokes(P0)"
+
+
+@pytest.mark.skipif(not find_spec("arviz"), reason="the extra arviz is not installed")
+@pytest.mark.filterwarnings("ignore")
+def test_arviz_itself_reads_the_samples(sampled):
+    """Whichever generation is installed: `InferenceData` or `DataTree`."""
+    import arviz
+
+    data = sampled.to_inference_data()
+    probability = data["posterior"]["probability"]
+    assert probability.dims == ("chain", "draw", "atom")
+    rows = np.flatnonzero(~sampled.exact)
+    assert probability["atom"].values.tolist() == [sampled.names[i] for i in rows]
+    np.testing.assert_allclose(probability.mean(("chain", "draw")).values, sampled.probabilities[rows], atol=1e-5)
+    assert arviz.summary(data, var_names=["probability"])["r_hat"].astype(float).max() < 1.1
 
 
 def test_nothing_sampled_nothing_exported(asked):
