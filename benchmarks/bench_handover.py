@@ -1,7 +1,9 @@
-"""Time of one optimisation: 100 random scenes x 4 mobility levels x 2 robots, 15^3 voxels x 8 orientations.
+"""Time of one optimisation, one question and one new plan: 100 random scenes x 4 mobility levels x 2 robots.
 
 Run: python benchmarks/bench_handover.py [scenes]. CPU seconds of one core; kernels are compiled before it starts.
-`fresh`: scene, grasps of an object not met before, optimisation. `warm`: the optimisation again.
+The map has 15^3 voxels x 8 orientations. `fresh`: scene, grasps of an object not met before, optimisation. `warm`: the
+optimisation again. `ask`: one question to a learnt model; `replan`: the question, the scene with the hand elsewhere,
+and the optimisation.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
+from mlnlite.domains import handover
 from mlnlite.domains.handover.grasps import sample_grasps
 from mlnlite.domains.handover.objects import object_names, read_object
 from mlnlite.domains.handover.receiver import Body, read_receiver
@@ -51,8 +54,46 @@ def run(seed, level, robot):
     return fresh, process_time() - start, result
 
 
+def learnt():
+    """A model of all generated instances, ready for questions."""
+    return handover.open_knowledge(
+        handover.train(handover.read_knowledge(), handover.facts_of(handover.generate())).model
+    )
+
+
+def timed(do, *arguments):
+    """CPU seconds of a call."""
+    start = process_time()
+    do(*arguments)
+    return process_time() - start
+
+
+def questions(n):
+    """CPU seconds of asking and of planning anew, warm."""
+    knowledge, rng, asked, planned = learnt(), np.random.default_rng(0), [], []
+    for seed in range(n):
+        name, task, body, offset = draw(seed)
+        level, thing, receiver = LEVELS[seed % 4], read_object(name), read_receiver(LEVELS[seed % 4], body)
+        scene = make_scene(thing, task, receiver, ROBOTS[seed % 2])
+        handover.advise(knowledge, scene)
+        asked.append(timed(handover.ask, knowledge, thing, task, level))
+        layout = Layout(hand=scene.hand.position + offset + rng.uniform(-0.02, 0.02, 3))
+        planned.append(timed(replan, knowledge, scene, layout))
+    for name, seconds in (("ask", asked), ("replan", planned)):
+        p50, p95, top = 1000 * np.percentile(seconds, [50, 95, 100])
+        print(f"{name:<8} p50 {p50:.1f} ms, p95 {p95:.1f} ms, max {top:.1f} ms over {n}")
+
+
+def replan(knowledge, scene, layout):
+    """A question, the scene with the hand where it is now, and the optimisation."""
+    answer = handover.ask(knowledge, scene.thing, scene.task, scene.receiver.level.name)
+    now = make_scene(scene.thing, scene.task, scene.receiver, scene.robot, layout=layout)
+    return answer, optimise(now)
+
+
 def main():
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    questions(n)
     rows = {(robot, level): [run(seed, level, robot) for seed in range(n)] for robot in ROBOTS for level in LEVELS}
     columns = f"{'fresh p50':>10}{'p95':>8}{'warm p50':>10}{'p95':>8}{'max':>8}{'IK p50':>8}{'max':>6}  status"
     print(f"{'robot':<8}{'level':<6}{columns}")
