@@ -15,7 +15,7 @@ EXAMPLES = {
     "alchemy": (
         'person = {Ann, "B C"}\ntime = {1,...,3}\nperson motherOf(person)\nP(person)\nAt(person, time!)\nRain\n'
         "1.5 P(motherOf(x)) => P(x)\n1 *P(x) ^ Rain\nEXIST x,y motherOf(x) = y ^ P(y).\n"
-        "1 At(x, t) ^ t < 3 => At(x, t + 1)\n2 At(x, +t)\n1 P(x) => Rain => P(x)\n1 At(x, succ(t))\n"
+        "1 At(x, t) ^ t < 3 => At(x, t + 1)\n2 At(x, +t)\n1 P(x) => Rain => P(x)\n1 At(x, t) v At(x, succ(t))\n"
     ),
     "tuffy": (
         "*wrote(person, paper)\n*year(paper, int_)\ncat(paper, label!)\nrel(paper p, paper q)\n"
