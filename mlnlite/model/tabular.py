@@ -183,15 +183,12 @@ def _aliased(parts: Sequence[str], n_arguments: int) -> list[str]:
 
 def _coded(connection: duckdb.DuckDBPyConnection, index: int) -> Coded:
     column = f"c{index}"
-    every = f"SELECT DISTINCT {column} FROM t WHERE {column} IS NOT NULL ORDER BY 1"
-    names = connection.execute(every).fetchall()
-    if not names:
-        n_rows = connection.execute("SELECT count(*) FROM t").fetchall()[0][0]
-        return Coded([], np.full(n_rows, -1, np.int32))
-    connection.execute(f"CREATE TYPE e{index} AS ENUM ({every})")
-    code = f"CAST(coalesce(CAST(enum_code(CAST({column} AS e{index})) AS BIGINT), -1) AS BIGINT)"
-    codes = connection.execute(f"SELECT {code} AS code FROM t").fetchnumpy()["code"]
-    return Coded([row[0] for row in names], np.asarray(codes, np.int32))
+    names = connection.execute(f"SELECT DISTINCT {column} FROM t WHERE {column} IS NOT NULL ORDER BY 1").fetchall()
+    rank = f"CAST(dense_rank() OVER (ORDER BY {column} NULLS LAST) AS INTEGER) - 1"
+    found = connection.execute(f"SELECT {rank} AS code, rowid AS row FROM t").fetchnumpy()
+    codes = np.empty(len(found["row"]), np.int32)
+    codes[found["row"]] = np.where(found["code"] < len(names), found["code"], -1)
+    return Coded([row[0] for row in names], codes)
 
 
 def _truth(

@@ -298,6 +298,9 @@ def _where(failure: Failure, offset: int) -> str:
 def _hint(failure: Failure) -> str:
     found, expected = failure.found_text, failure.expected
     for applies, hint in (
+        (found == "," and re.match(r"@?[-+]?\d+,\d", failure.text), "a decimal number is written with a point, as 1.5"),
+        (found == "%" and failure.text[: failure.at].isdigit(), "a probability of 50 % is written `p=0.5:`"),
+        (found == ";", "a statement ends with its line, without a sign"),
         (failure.at == 0 and found in _SIGNS, "to go on from the line above, end that line with the connective"),
         (found == "?" and failure.language == "prac", "write the name of the variable right after its `?`"),
         (found == "*" and failure.rule == "fact", "`*` belongs to the declaration of the predicate in the model"),
