@@ -31,7 +31,7 @@ MORE = [
     ),
     (
         "prac",
-        'P(t)\nQ(t)\nt = {k, "b c"}\n1 P(?x) ^ Q(?x) v P(k)\n0.5 P("b c") => Q(?y)\n#unique{+?a,+?b}\n1 P(+?a) ^ Q(+?b)',
+        'P(t)\nQ(t)\nt = {k, "b c"}\n1 P(?x)^Q(?x) v P(k)\n0.5 P("b c") => Q(?y)\n#unique{+?a,+?b}\n1 P(+?a) ^ Q(+?b)',
     ),
     ("alchemy", "P(t)\nQ(t)\nt = {A, B}\n1 P(x) ^ Q(x) v P(A)\n1 EXIST x P(x) ^ Q(y)\n2. P(x) => Q(x) => P(A)"),
     ("lomrf", "P(t)\nQ(t)\nN(t)\nt = {1, 2, 3}\nP(x) :- Q(x), N(x++)\nN(x++) :- Q(x)\n0.5 Q(x)"),
