@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from mlnlite.learn.prior import Gaussian as Gaussian
     from mlnlite.learn.prior import Hierarchical as Hierarchical
     from mlnlite.learn.prior import Laplace as Laplace
+    from mlnlite.learn.prior import Prior as Prior
     from mlnlite.learn.structure import Structure as Structure
     from mlnlite.learn.structure import find_rules as find_rules
     from mlnlite.learn.uncertainty import Uncertainty as Uncertainty
@@ -97,6 +98,7 @@ _HOMES = {
     "Gaussian": "mlnlite.learn.prior",
     "Hierarchical": "mlnlite.learn.prior",
     "Laplace": "mlnlite.learn.prior",
+    "Prior": "mlnlite.learn.prior",
     "Structure": "mlnlite.learn.structure",
     "find_rules": "mlnlite.learn.structure",
     "Uncertainty": "mlnlite.learn.uncertainty",

@@ -11,7 +11,7 @@ from mlnlite.domains.handover.knowledge.words import asked_predicates
 
 
 def train(
-    model: ml.Model, instances: Sequence[Sequence[Fact]], *, prior: float | ml.Hierarchical | None = None
+    model: ml.Model, instances: Sequence[Sequence[Fact]], *, prior: ml.Prior | float | None = None
 ) -> ml.LearnedModel:
     """Weights by conditional likelihood of what is asked, given all that is known.
 
@@ -25,7 +25,8 @@ def train(
     """
     rows = [kept(facts, model.predicates) for facts in instances]
     data = ml.evidence_from_text(gathered_text(rows), model=model)
-    return ml.learn(model, data, predict=asked_predicates(model), prior=prior or ml.Hierarchical())
+    own = ml.Hierarchical() if prior is None else prior
+    return ml.learn(model, data, predict=asked_predicates(model), prior=own)
 
 
 def write_knowledge(learned: ml.LearnedModel, path: str | Path) -> None:
