@@ -29,6 +29,12 @@ from mlnlite.engines.plan import (
     Where,
 )
 
+SAMPLE = 1_000_000
+"""Rows of a column whose values are counted."""
+
+DENSEST = 1 << 24
+"""Values that are told apart in counting them."""
+
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
@@ -56,7 +62,11 @@ def estimate(plan: Plan, tables: Tables) -> Estimate:
     @cache
     def n_distinct(table: str, column: int) -> float:
         values = tables[table][column]
-        return float(len(np.unique(values[:: max(1, len(values) // 100_000)])))
+        values = values[:: max(1, len(values) // SAMPLE)]
+        low = int(values.min(initial=0))
+        seen = np.zeros(min(int(values.max(initial=0)) - low + 1, DENSEST), np.bool_)
+        seen[(values - low) % len(seen)] = True
+        return float(np.count_nonzero(seen))
 
     return _estimate(plan, tables, n_distinct)
 
@@ -100,6 +110,7 @@ def _estimate(plan: Plan, tables: Tables, n_distinct: Callable[[str, int], float
 def _scan(plan: Scan, tables: Tables, n_distinct: Callable[[str, int], float]) -> Estimate:
     stored = tables[plan.table]
     rows = float(len(stored[0])) if stored else 1.0
+    rows = rows if plan.part is None else float(plan.part[1] - plan.part[0])
     distinct: dict[str, float] = {}
     for i, column in enumerate(plan.columns):
         if isinstance(column, int) or column in distinct:

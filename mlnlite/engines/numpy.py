@@ -113,6 +113,8 @@ def _run(plan: Plan, tables: Tables, most: int | None) -> _Rows:
 
 def _scan(plan: Scan, tables: Tables) -> _Rows:
     stored = tables[plan.table]
+    if plan.part is not None:
+        stored = tuple(column[slice(*plan.part)] for column in stored)
     keep: Bool | None = None
     columns: dict[str, Column] = {}
     for column, wanted in zip(stored, plan.columns, strict=True):

@@ -25,11 +25,12 @@ class Scan:
     """Rows of a stored table.
 
     Each entry of `columns` names a column (twice the same name: equal), is a number that the column must have, or None
-    for a column that does not matter.
+    for a column that does not matter. `part` chooses a range of the table's rows, in the table's own order.
     """
 
     table: str
     columns: tuple[str | int | None, ...]
+    part: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,7 @@ def columns_of(plan: Plan) -> tuple[str, ...]:
     ('x', 'y', 'z')
     """
     match plan:
-        case Scan(_, scanned):
+        case Scan(columns=scanned):
             return tuple(dict.fromkeys(c for c in scanned if isinstance(c, str)))
         case One():
             return ()

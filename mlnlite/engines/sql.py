@@ -1,4 +1,4 @@
-"""Plan to SQL text: integers, joins, NOT EXISTS, GROUP BY; nothing that one database only has."""
+"""Plan to SQL text: integers, joins, NOT EXISTS, GROUP BY; `rowid` for parts of a table."""
 
 from __future__ import annotations
 
@@ -88,6 +88,8 @@ def _scan(plan: Scan) -> str:
         elif isinstance(column, str):
             first[column] = i
     columns = ", ".join(f"c{i} AS {quoted(c)}" for c, i in first.items()) or '1 AS "_"'
+    if plan.part is not None:
+        conditions.append(f"rowid >= {plan.part[0]} AND rowid < {plan.part[1]}")
     where = f" WHERE {' AND '.join(conditions)}" if conditions else ""
     return f"SELECT {columns} FROM {quoted(plan.table)}{where}"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from mlnlite.ground.states import counts_of
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Predicate
+
+S = TypeVar("S")
+K = TypeVar("K")
 
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
@@ -226,52 +229,41 @@ def _may_be_none(first: Int64, is_block: NDArray[np.bool_], evidence: Evidence) 
 
 
 def _clauses(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Clauses, ...]:
-    gathered: dict[tuple[int, bool], list[Columns]] = {}
-    for part, offset in zip(parts, first, strict=False):
-        for piece in part.pieces:
-            if isinstance(piece.shape, ClauseShape):
-                codes = [code_of(index(a), s) for a, s in zip(piece.atoms, piece.shape.signs, strict=True)]
-                key = (len(codes), piece.shape.negated)
-                gathered.setdefault(key, []).append((*codes, (piece.row + offset).astype(np.int32), piece.count))
+    found = _of_kind(parts, first, ClauseShape, lambda shape: (len(shape.atoms), shape.negated))
     blocks = []
-    for (_, negated), items in sorted(gathered.items()):
-        *codes, weight, count = _joined(items)
-        blocks.append(Clauses(*merged_codes(codes, weight, count), negated))
+    for (_, negated), pieces in sorted(found.items()):
+        codes = (
+            ([code_of(index(a), s) for a, s in zip(p.atoms, p.shape.signs, strict=True)], weight, p.count)
+            for p, weight in pieces
+        )
+        blocks.append(Clauses(*merged_codes(codes), negated))
     return tuple(blocks)
 
 
 def _tables(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Tables, ...]:
-    gathered: dict[tuple[int, bytes], list[Columns]] = {}
-    for part, offset in zip(parts, first, strict=False):
-        for piece in part.pieces:
-            if isinstance(piece.shape, TableShape):
-                atoms = [index(a) for a in piece.atoms]
-                key = (piece.shape.truth.ndim, piece.shape.truth.tobytes())
-                gathered.setdefault(key, []).append((*atoms, (piece.row + offset).astype(np.int32), piece.count))
+    found = _of_kind(parts, first, TableShape, lambda shape: (shape.truth.ndim, shape.truth.tobytes()))
     blocks = []
-    for (n_atoms, truth), items in sorted(gathered.items()):
-        *atoms, weight, count = _joined(items)
-        rows, weight, count = merged(atoms, weight, count)
+    for (n_atoms, truth), pieces in sorted(found.items()):
+        rows, weight, count = merged(([index(a) for a in p.atoms], weight, p.count) for p, weight in pieces)
         blocks.append(Tables(rows, np.frombuffer(truth, np.bool_).reshape((2,) * n_atoms), weight, count))
     return tuple(blocks)
 
 
 def _counts(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Counts, ...]:
-    gathered: dict[CountShape, list[Columns]] = {}
+    found = _of_kind(parts, first, CountShape, lambda shape: shape)
+    return tuple(
+        counts_of(shape, *merged(([index(a) for a in p.atoms], weight, p.count) for p, weight in pieces))
+        for shape, pieces in found.items()
+    )
+
+
+def _of_kind(
+    parts: Sequence[Part], first: Int64, kind: type[S], key: Callable[[S], K]
+) -> dict[K, list[tuple[Piece, Int32]]]:
+    """The pieces with a kind of shape, and their weights, by a key of their shapes."""
+    found: dict[K, list[tuple[Piece, Int32]]] = {}
     for part, offset in zip(parts, first, strict=False):
         for piece in part.pieces:
-            if isinstance(piece.shape, CountShape):
-                columns = (*map(index, piece.atoms), (piece.row + offset).astype(np.int32), piece.count)
-                gathered.setdefault(piece.shape, []).append(columns)
-    blocks = []
-    for shape, items in gathered.items():
-        *atoms, weight, count = _joined(items)
-        blocks.append(counts_of(shape, *merged(atoms, weight, count)))
-    return tuple(blocks)
-
-
-Columns: TypeAlias = tuple[NDArray[Any], ...]
-
-
-def _joined(items: Sequence[Columns]) -> list[NDArray[Any]]:
-    return list(items[0]) if len(items) == 1 else [np.concatenate(c) for c in zip(*items, strict=True)]
+            if isinstance(piece.shape, kind):
+                found.setdefault(key(piece.shape), []).append((piece, (piece.row + offset).astype(np.int32)))
+    return found

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.numpy import NumpyEngine
-from mlnlite.engines.plan import Count, Engine, Run
+from mlnlite.engines.plan import Count, Engine, Run, Tables
 from mlnlite.ground.compile import Source, bindings
 from mlnlite.ground.ground import counting_source, groundings_of_a_row, part_of, plan_of, row_tables, source_of
 from mlnlite.ground.tables import tables_of
@@ -27,12 +27,13 @@ def count_true(model: Model, world: Evidence, *, engine: Engine | None = None) -
         engine: what runs the joins; by default the reference engine.
     """
     world = closed(world, world.predicates)
-    run = (engine or NumpyEngine()).load({**tables_of(world), **row_tables(model)})
+    tables = {**tables_of(world), **row_tables(model)}
+    run = (engine or NumpyEngine()).load(tables)
     found = [np.empty(0, np.int64)]
     for i, template in enumerate(model.templates):
         counting = counting_source(i, template, world)
         if counting is not None:
-            found.append(_by_listing(counting, run))
+            found.append(_by_listing(counting, run, tables))
             continue
         source = source_of(i, template, world)
         false, true = cubes(source.formula.body, False), cubes(source.formula.body, True)
@@ -45,11 +46,11 @@ def count_true(model: Model, world: Evidence, *, engine: Engine | None = None) -
     return np.concatenate(found)
 
 
-def _by_listing(source: Source, run: Run) -> Int64:
+def _by_listing(source: Source, run: Run, tables: Tables) -> Int64:
     """True groundings of a formula with counts: these are listed, and found to be decided."""
     plan = plan_of(source)
     if isinstance(plan, bool):
         return np.full(source.n_rows, plan * groundings_of_a_row(source), np.int64)
-    part = part_of(source, plan, run)
+    part = part_of(source, plan, run, tables)
     assert part is not None
     return part.decided_true

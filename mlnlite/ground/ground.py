@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import prod
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.choose import engine_for
+from mlnlite.engines.parts import in_parts
 from mlnlite.engines.plan import Column, Engine, Relation, Run, Tables
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
 from mlnlite.ground.assemble import Part, Piece, network_of, sums_by
@@ -79,7 +80,7 @@ def _ground_template(source: Source, template: Template, run: Run, tables: Table
         return _constant(source, template, truth=plan)
     if limits != NO_LIMITS:
         verify(forecast(template, plan.compiled, tables), source, limits)
-    return _grounded(source, template, plan, run)
+    return _grounded(source, template, plan, run, tables)
 
 
 @contextmanager
@@ -213,17 +214,26 @@ def plan_of(source: Source) -> TemplatePlan | bool:
     return TemplatePlan(compiled(source, true if lists_true else false, equalities), lists_true, false)
 
 
-def part_of(source: Source, planned: TemplatePlan, run: Run) -> Part | None:
+def part_of(source: Source, planned: TemplatePlan, run: Run, tables: Tables) -> Part | None:
     """What a template gives; None if what it counts cannot be told from counts. Raises `LimitReached`, unnamed."""
     plan = planned.compiled
-    rows = run(plan.plan)
-    groups = counting_groups(source, rows) if source.counted else groups_of(source.formula, plan, rows)
-    return None if groups is None else _part(source, plan, rows, groups, lists_true=planned.lists_true)
+    tally = _Tally([], *(np.zeros(source.n_rows, np.int64) for _ in range(3)))
+    for chunk in in_parts(plan.plan, tables):
+        rows = run(chunk)
+        groups = counting_groups(source, rows) if source.counted else groups_of(source.formula, plan, rows)
+        if groups is None:
+            return None
+        _add(tally, source, plan, rows, groups)
+    total = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
+    unlisted = total - tally.open - tally.true - tally.false
+    if planned.lists_true:
+        return Part(tuple(tally.pieces), tally.true, tally.false + unlisted)
+    return Part(tuple(tally.pieces), tally.true + unlisted, tally.false)
 
 
-def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Run) -> Part | None:
+def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Run, tables: Tables) -> Part | None:
     try:
-        part = part_of(source, planned, run)
+        part = part_of(source, planned, run, tables)
     except LimitReached as error:
         cause = error.diagnostics[0]
         message = f"{template.name} cannot be grounded: {cause.message}"
@@ -284,30 +294,30 @@ def _constant(source: Source, template: Template, *, truth: bool) -> Part:
     return Part((), every, none) if truth else Part((), none, every)
 
 
-def _part(source: Source, plan: Compiled, rows: Relation, groups: list[Group], *, lists_true: bool) -> Part:
-    """The pieces of a template, and how many groundings of each of its rows evidence decides."""
+@dataclass(frozen=True, slots=True)
+class _Tally:
+    """What was found so far: pieces, and for each row of the template how many groundings are true, false, open."""
+
+    pieces: list[Piece]
+    true: Int64
+    false: Int64
+    open: Int64
+
+
+def _add(tally: _Tally, source: Source, plan: Compiled, rows: Relation, groups: Sequence[Group]) -> None:
+    """Adds groups of rows to a tally."""
     n_rows = len(next(iter(rows.values()))) if rows else 1
-    row = rows["row"] if source.tabled else None
-    count = rows["count"] if plan.counted else None
-    total = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
-    listed = {True: np.zeros(source.n_rows, np.int64), False: np.zeros(source.n_rows, np.int64)}
-    open_ = np.zeros(source.n_rows, np.int64)
-    pieces = []
+    row = rows["row"] if source.tabled else np.broadcast_to(np.int32(0), n_rows)
+    count = rows["count"] if plan.counted else np.broadcast_to(np.int64(1), n_rows)
     for group in groups:
-        n = n_rows if isinstance(group.index, slice) else len(group.index)
-        own_row = np.broadcast_to(np.int32(0), n) if row is None else row[group.index]
-        own_count = np.broadcast_to(np.int64(1), n) if count is None else count[group.index]
-        sums = sums_by(own_row, own_count, source.n_rows)
+        mine, times = row[group.index], count[group.index]
+        sums = sums_by(mine, times, source.n_rows)
         if isinstance(group.shape, Decided):
-            listed[group.shape.truth] += sums
+            decided = tally.true if group.shape.truth else tally.false
+            np.add(decided, sums, out=decided)
             continue
-        open_ += sums
-        pieces.append(Piece(group.atoms, group.shape, own_row, own_count))
-    if lists_true:
-        decided_true, decided_false = listed[True], total - open_ - listed[True]
-    else:
-        decided_true, decided_false = total - open_ - listed[False], listed[False]
-    return Part(tuple(pieces), decided_true, decided_false)
+        np.add(tally.open, sums, out=tally.open)
+        tally.pieces.append(Piece(group.atoms, group.shape, mine, times))
 
 
 def groundings_of_a_row(source: Source) -> int:

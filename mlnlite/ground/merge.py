@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
+
+CHUNK = 1 << 18
+"""Rows that are worked on at once, so that they stay in the cache."""
+
+Piece = tuple[Sequence[Int32], Int32, Int64]
+"""Columns of rows, and for each row its weight and its count."""
 
 Factors = tuple[Int32, Int32, Int64]
 """Rows of shape (n, k), and for each row its weight and its count."""
@@ -22,7 +28,7 @@ def merged_clauses(literals: Sequence[Int32], weight: Int32, count: Int64) -> Fa
         weight: shape (n,).
         count: shape (n,).
     """
-    return merged_codes([(np.abs(c) << 1) | (c < 0) for c in literals], weight, count)
+    return merged_codes([([(np.abs(c) << 1) | (c < 0) for c in literals], weight, count)])
 
 
 def code_of(index: Int32, positive: bool) -> Int32:
@@ -30,36 +36,53 @@ def code_of(index: Int32, positive: bool) -> Int32:
     return np.asarray((index << np.int32(1)) + np.int32(2 if positive else 3))
 
 
-def merged_codes(codes: Sequence[Int32], weight: Int32, count: Int64) -> Factors:
-    """As `merged_clauses`, of the codes of literals; see `code_of`."""
-    rows, weight, count = merged(_sorted_rows(list(codes)), weight, count)
-    sign = np.int32(1) - ((rows & np.int32(1)) << np.int32(1))
-    return _locked((rows >> np.int32(1)) * sign, weight, count)
+def merged_codes(pieces: Iterable[Piece]) -> Factors:
+    """As `merged_clauses`, of clauses in pieces, whose literals are given by their codes; see `code_of`."""
+    rows, weight, count = _merged([(_sorted_rows(list(codes)), w, n) for codes, w, n in pieces])
+    for start in range(0, len(rows), CHUNK):
+        chunk = rows[start : start + CHUNK]
+        negative = (chunk & np.int32(1)).astype(np.bool_)
+        chunk >>= np.int32(1)
+        np.negative(chunk, out=chunk, where=negative)
+    return _locked(rows, weight, count)
 
 
-def merged(columns: Sequence[Int32], weight: Int32, count: Int64) -> Factors:
-    """Rows with equal numbers (not negative) and equal weights made one."""
-    bits = int(max((int(c.max(initial=0)) for c in columns), default=0)).bit_length()
-    if bits * len(columns) + int(weight.max(initial=0)).bit_length() > 62:
-        return _merged_by_columns(columns, weight, count)
+def merged(pieces: Iterable[Piece]) -> Factors:
+    """Rows in pieces, with equal numbers (not negative) and equal weights made one."""
+    return _locked(*_merged(list(pieces)))
+
+
+def _merged(pieces: list[Piece]) -> Factors:
+    k = len(pieces[0][0])
+    bits = max(int(c.max(initial=0)) for columns, _, _ in pieces for c in columns).bit_length() if k else 0
+    if bits * k + max(int(w.max(initial=0)) for _, w, _ in pieces).bit_length() > 62:
+        columns = [np.concatenate([p[0][i] for p in pieces]) for i in range(k)]
+        return _merged_by_columns(columns, *(np.concatenate([p[i] for p in pieces]) for i in (1, 2)))
+    plain = all(int(n.max(initial=1)) == 1 for _, _, n in pieces)
+    key = np.concatenate([_packed(columns, weight, bits) for columns, weight, _ in pieces])
+    key, count = _added(key, None if plain else np.concatenate([n for _, _, n in pieces]))
+    rows, weight = np.empty((len(key), k), np.int32), np.empty(len(key), np.int32)
+    for start in range(0, len(key), CHUNK):
+        chunk = slice(start, start + CHUNK)
+        part = key[chunk]
+        for i in reversed(range(k)):
+            rows[chunk, i] = part & ((1 << bits) - 1)
+            part >>= bits
+        weight[chunk] = part
+    return rows, weight, count
+
+
+def _packed(columns: Sequence[Int32], weight: Int32, bits: int) -> Int64:
     key = weight.astype(np.int64)
     for column in columns:
         key <<= bits
         key |= column
-    key, count = _added(key, count)
-    rows = np.empty((len(key), len(columns)), np.int32)
-    for i in reversed(range(len(columns))):
-        rows[:, i] = key & ((1 << bits) - 1)
-        key >>= bits
-    return _locked(rows, key.astype(np.int32), count)
+    return key
 
 
-def _added(key: Int64, count: Int64) -> tuple[Int64, Int64]:
-    """The keys in rising order, each once, and the sums of their counts. The keys given may be changed."""
-    if len(key) == 0:
-        return key, count
-    plain = int(count.max()) == 1
-    if not plain:
+def _added(key: Int64, count: Int64 | None) -> tuple[Int64, Int64]:
+    """The keys in rising order, each once, and the sums of their counts (None: 1 each). Changes the keys given."""
+    if count is not None:
         order = np.argsort(key)
         key, count = key[order], count[order]
     elif not (key[1:] >= key[:-1]).all():
@@ -67,9 +90,9 @@ def _added(key: Int64, count: Int64) -> tuple[Int64, Int64]:
     new = np.ones(len(key), np.bool_)
     np.not_equal(key[1:], key[:-1], out=new[1:])
     if new.all():
-        return key, np.array(count)
+        return key, np.ones(len(key), np.int64) if count is None else count
     starts = np.flatnonzero(new)
-    return key[starts], np.diff(starts, append=len(key)) if plain else np.add.reduceat(count, starts)
+    return key[starts], np.diff(starts, append=len(key)) if count is None else np.add.reduceat(count, starts)
 
 
 def _merged_by_columns(columns: Sequence[Int32], weight: Int32, count: Int64) -> Factors:
@@ -78,7 +101,7 @@ def _merged_by_columns(columns: Sequence[Int32], weight: Int32, count: Int64) ->
     new = np.ones(len(order), bool)
     new[1:] = (weight[1:] != weight[:-1]) | (rows[1:] != rows[:-1]).any(axis=1)
     starts = np.flatnonzero(new)
-    return _locked(rows[starts], weight[starts], np.add.reduceat(count, starts) if len(starts) else count)
+    return rows[starts], weight[starts], np.add.reduceat(count, starts) if len(starts) else count
 
 
 def _locked(rows: Int32, weight: Int32, count: Int64) -> Factors:
