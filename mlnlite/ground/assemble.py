@@ -232,12 +232,14 @@ def _clauses(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Clauses
     found = _of_kind(parts, first, ClauseShape, lambda shape: (len(shape.atoms), shape.negated))
     blocks = []
     for (_, negated), pieces in sorted(found.items()):
-        codes = (
-            ([code_of(index(a), s) for a, s in zip(p.atoms, p.shape.signs, strict=True)], weight, p.count)
-            for p, weight in pieces
-        )
+        codes = ((_codes(p, index), weight, p.count) for p, weight in pieces)
         blocks.append(Clauses(*merged_codes(codes), negated))
     return tuple(blocks)
+
+
+def _codes(piece: Piece, index: Index) -> list[Int32]:
+    assert isinstance(piece.shape, ClauseShape)
+    return [code_of(index(a), sign) for a, sign in zip(piece.atoms, piece.shape.signs, strict=True)]
 
 
 def _tables(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Tables, ...]:
