@@ -10,8 +10,6 @@ import os
 import sys
 from typing import Any
 
-from pyganak import WeightedCounter
-
 
 def main() -> None:
     """Reads one problem per line, writes one answer per line; what Ganak prints goes elsewhere."""
@@ -36,6 +34,8 @@ def count(problem: dict[str, Any]) -> dict[str, Any]:
 
 def _count(problem: dict[str, Any], more: list[list[int]]) -> float:
     """Weight of the models that satisfy some more clauses."""
+    from pyganak import WeightedCounter
+
     counter = WeightedCounter()
     counter.new_vars(problem["n_variables"])
     counter.add_clauses(problem["clauses"] + more)
