@@ -54,7 +54,7 @@ def entries(templates: Sequence[Template], evidence: Evidence, run: Run, targets
     found: dict[str, list[Entries]] = {name: [] for name in targets}
     first = 0
     for i, template in enumerate(templates):
-        source = source_of(i, template, evidence, "database")
+        source = source_of(i, template, evidence, "database" if evidence.n_databases > 1 else None)
         for sign, case in _cases(source):
             for target, (schema, _) in enumerate(case.literals):
                 if schema.predicate in targets:
@@ -82,7 +82,8 @@ def _counted(source: Source, case: Case, target: int, sign: int, first: int, run
     rows = {name: column.astype(np.int64, copy=False) for name, column in run(plan).items()}
     weight = rows["row"] + first if source.tabled else np.full(len(rows["count"]), first, np.int64)
     change = rows["count"] * (sign if truth else -sign)
-    return [Entries(rows["database"], rows["atom"], weight, change)]
+    database = rows["database"] if source.world else np.zeros(len(change), np.int64)
+    return [Entries(database, rows["atom"], weight, change)]
 
 
 def _others(case: Case, target: int, predicate: Predicate) -> list[tuple[AtomSchema, bool]] | None:
@@ -115,7 +116,7 @@ def _plan(source: Source, case: Case, others: list[tuple[AtomSchema, bool]], tar
     cube |= {Equal(variable, by): True for variable, by in case.same}
     plan = bindings(replace(source, formula=formula), cube, source.formula.free)
     plan = with_number(plan, source.evidence, target, "atom")
-    by = ("database", *(("row",) if source.tabled else ()), "atom")
+    by = (*((source.world,) if source.world else ()), *(("row",) if source.tabled else ()), "atom")
     return Count(plan, by)
 
 
