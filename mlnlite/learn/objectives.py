@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +19,18 @@ from mlnlite.learn.choices import listed
 from mlnlite.learn.counts import entries
 from mlnlite.learn.exact import Labels, compiled
 from mlnlite.learn.learned import How
-from mlnlite.learn.margin import Labelled, labelled_network, widest
 from mlnlite.learn.merge import Listed, merged
 from mlnlite.learn.newton import Optimum
 from mlnlite.learn.prior import Hierarchical, Penalty, Prior, penalty_of, prior_of_each
 from mlnlite.learn.problem import Problem, problem_of
-from mlnlite.learn.sampled import sampled
 from mlnlite.learn.solve import Solution, solve, solve_hierarchical, start_of
 from mlnlite.learn.wide import Wide
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
 from mlnlite.model.model import Model
+
+if TYPE_CHECKING:
+    from mlnlite.learn.margin import Labelled
 
 Float = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -91,6 +93,8 @@ def _once(wide: Sequence[Wide]) -> tuple[Wide, ...]:
 
 def _labelled(labels: Sequence[tuple[Labels, int]], times: Float) -> tuple[Labelled, ...]:
     """The databases of max-margin learning, equal ones once."""
+    from mlnlite.learn.margin import labelled_network  # late: most learning needs no most probable worlds
+
     found: dict[int, tuple[Labels, int, float]] = {}
     for (one, n), many in zip(labels, times.tolist(), strict=True):
         found[id(one)] = one, n, many + (found[id(one)][2] if id(one) in found else 0.0)
@@ -191,6 +195,8 @@ def solved(model: Model, task: Task, prior: Prior | None, search: Search) -> Sol
 
 
 def _sampled(problem: Problem, penalty: Penalty, start: Float, search: Search) -> Solution:
+    from mlnlite.learn.sampled import sampled  # late: most learning draws nothing
+
     found = sampled(problem, penalty.of(problem.free), start, search.seed, search.deadline)
     optimum = Optimum(found.x, np.nan, found.gradient, found.rounds, found.status, ())
     none = np.zeros(len(found.x), np.int8)
@@ -198,6 +204,8 @@ def _sampled(problem: Problem, penalty: Penalty, start: Float, search: Search) -
 
 
 def _widest(task: Task, penalty: Penalty, search: Search) -> Solution:
+    from mlnlite.learn.margin import widest
+
     problem = task.problem
     own = penalty.of(problem.free)
     if not (own.precision > 0).all() or own.l1.any() or own.cauchy.any():
