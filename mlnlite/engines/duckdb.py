@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -41,20 +43,30 @@ class DuckDBEngine:
         connection.execute("SET temp_directory = ?", [scratch.name])
         if self.memory is not None:
             connection.execute("SET memory_limit = ?", [f"{max(self.memory // 10**6, 1)}MB"])
-        for name, columns in tables.items():
-            connection.register("given", {f"c{i}": column for i, column in enumerate(columns)})
-            connection.execute(f"CREATE TABLE {quoted(name)} AS SELECT * FROM given")
-            connection.unregister("given")
+        with self._bounded("loading the facts"):
+            for name, columns in tables.items():
+                connection.register("given", {f"c{i}": column for i, column in enumerate(columns)})
+                connection.execute(f"CREATE TABLE {quoted(name)} AS SELECT * FROM given")
+                connection.unregister("given")
 
         def run(plan: Plan) -> Relation:
-            try:
+            with self._bounded("a join"):
                 result = connection.execute(query(plan)).fetchnumpy()
-            except duckdb.OutOfMemoryException as error:
-                raise LimitReached(f"a join needs more memory than the limit of {self.memory or 0:,} bytes") from error
             return {name: np.asarray(result[name]) for name in columns_of(plan)}
 
         finalize(run, _close, connection, scratch)
         return run
+
+    @contextmanager
+    def _bounded(self, what: str) -> Iterator[None]:
+        """Says what needed too much memory."""
+        import duckdb
+
+        try:
+            yield
+        except duckdb.OutOfMemoryException as error:
+            limit = "there is" if self.memory is None else f"the limit of {self.memory:,} bytes"
+            raise LimitReached(f"{what} needs more memory than {limit}") from error
 
 
 def _close(connection: DuckDBPyConnection, scratch: TemporaryDirectory[str]) -> None:

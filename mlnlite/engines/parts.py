@@ -22,10 +22,10 @@ def in_parts(plan: Plan, tables: Tables, chunk: int = CHUNK) -> list[Plan]:
         tables: what it draws on.
         chunk: rows that each part should have, about.
     """
-    first, *others = _scans(plan)
     start = _start(plan)
-    if start is None or prod(_length(s, tables) for s in (first, *others)) <= 2 * chunk:
+    if start is None or most_rows(plan, tables) <= 2 * chunk:
         return [plan]
+    _, *others = _scans(plan)
     widest = estimate(plan, tables).widest
     n_rows = _length(start, tables)
     n = min(n_rows, int(widest / chunk) + 1)
@@ -35,29 +35,33 @@ def in_parts(plan: Plan, tables: Tables, chunk: int = CHUNK) -> list[Plan]:
     return [_starting_from(plan, replace(start, part=part)) for part in pairwise(ends)]
 
 
+def most_rows(plan: Plan, tables: Tables) -> int:
+    """A number of rows that no join of a plan can exceed."""
+    return prod(max(_length(s, tables), 1) for s in _scans(plan))
+
+
 def _length(scan: Scan, tables: Tables) -> int:
     stored = tables[scan.table]
     return len(stored[0]) if stored else 1
 
 
 def _scans(plan: Plan) -> Iterator[Scan]:
-    """All scans, the one that the plan starts from first."""
+    """The scans whose rows are joined, the one that the plan starts from first."""
     match plan:
         case Scan():
             yield plan
-        case Join(left, right) | AntiJoin(left, right):
+        case Join(left, right):
             yield from _scans(left)
             yield from _scans(right)
+        case AntiJoin(left):
+            yield from _scans(left)
         case Union(sources):
             for source in sources:
                 yield from _scans(source)
-        case Lookup(source, table):
-            yield from _scans(source)
-            yield Scan(table, ())
-        case Where(source) | Compute(source) | Project(source) | Count(source):
+        case Where(source) | Compute(source) | Project(source) | Count(source) | Lookup(source):
             yield from _scans(source)
         case One():
-            yield Scan("worlds", ())
+            return
 
 
 def _start(plan: Plan) -> Scan | None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from pathlib import Path
 
 from mlnlite.engines.forecast import estimate
 from mlnlite.engines.plan import Tables
@@ -75,6 +77,17 @@ def verify(expected: Forecast, source: Source, limits: Limits) -> None:
     else:
         return
     raise too_large(expected.template, source, over)
+
+
+def machine_limits() -> Limits:
+    """The memory of the machine, or of the container; no limit where the system does not say."""
+    try:
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return Limits()
+    container = Path("/sys/fs/cgroup/memory.max")
+    given = container.read_text().strip() if container.exists() else ""
+    return Limits(memory=min(memory, int(given)) if given.isdigit() else memory)
 
 
 def too_large(template: Template, source: Source, over: str) -> LimitReached:

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.choose import engine_for
-from mlnlite.engines.parts import in_parts
+from mlnlite.engines.parts import in_parts, most_rows
 from mlnlite.engines.plan import Column, Engine, Relation, Run, Tables
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
 from mlnlite.ground.assemble import Part, Piece, network_of, sums_by
 from mlnlite.ground.compile import Compiled, Source, atom_column, bindings, column, compiled, with_atom
 from mlnlite.ground.counting import counting_groups, counting_plan, plain_cubes
-from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, verify
+from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, machine_limits, too_large, verify
 from mlnlite.ground.groups import Group, groups_of
 from mlnlite.ground.network import Network
 from mlnlite.ground.residual import Decided, equalities_in
@@ -35,6 +35,9 @@ Int64 = NDArray[np.int64]
 
 NO_LIMITS = Limits()
 
+UNCHECKED = 10_000_000
+"""Rows that no machine minds: what cannot have more is not forecast."""
+
 
 def ground(
     model: Model,
@@ -51,7 +54,7 @@ def ground(
         evidence: one database.
         query: numbers of atoms that must be in the network even if no factor touches them (known ones are left out).
         engine: what runs the plans; by default chosen by the size of the input.
-        limits: what it may take.
+        limits: what it may take; by default the machine's memory.
 
     Raises:
         QueryMistake: if the evidence has several databases, or a formula has no weight.
@@ -78,7 +81,8 @@ def _ground_template(source: Source, template: Template, run: Run, tables: Table
     plan = plan_of(source)
     if isinstance(plan, bool):
         return _constant(source, template, truth=plan)
-    if limits != NO_LIMITS:
+    if limits != NO_LIMITS or most_rows(plan.compiled.plan, tables) > UNCHECKED:
+        limits = machine_limits() if limits == NO_LIMITS else limits
         verify(forecast(template, plan.compiled, tables), source, limits)
     return _grounded(source, template, plan, run, tables)
 
@@ -234,6 +238,8 @@ def part_of(source: Source, planned: TemplatePlan, run: Run, tables: Tables) -> 
 def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Run, tables: Tables) -> Part | None:
     try:
         part = part_of(source, planned, run, tables)
+    except MemoryError as error:
+        raise too_large(template, source, "more memory than there is") from error
     except LimitReached as error:
         cause = error.diagnostics[0]
         message = f"{template.name} cannot be grounded: {cause.message}"
