@@ -62,27 +62,29 @@ def two_modes(n=24):
 
 CASES = {
     "smokers": (lambda: smokers(150, 160), ("gibbs", "mcsat", "tempering")),
-    "nearly hard": (nearly_hard, ("mcsat",)),
-    "one hot": (one_hot, ("gibbs", "mcsat")),
-    "two modes": (two_modes, ("mcsat",)),
+    "nearly hard": (lambda: nearly_hard(100), ("mcsat",)),
+    "harder still": (lambda: nearly_hard(100, 10.0), ("mcsat",)),
+    "one hot": (lambda: one_hot(90), ("gibbs", "mcsat")),
+    "two modes": (lambda: two_modes(120), ("mcsat",)),
 }
 
 
 @pytest.mark.parametrize(("name", "sampler"), [(n, s) for n, (_, samplers) in CASES.items() for s in samplers])
 def test_errors_are_as_large_as_they_say(name, sampler):
+    """Many atoms, because those of a chain or triple are off together: 300 to 500 errors that are independent."""
     net = CASES[name][0]()
     exact = marginals_of(net).probability
     scores = []
-    for seed in (1, 2):
-        found = sample(net, *everything(net), sampler, Effort(0.01, 120.0, seed=seed))
+    for seed in (1, 2, 3, 4):
+        found = sample(net, *everything(net), sampler, Effort(0.02, 300.0, seed=seed))
         assert found.ending == "precise"
         sure = found.exact | (found.error == 0)
         assert np.abs(found.probability - exact)[sure].max(initial=0) < 1e-6
         scores.append(((found.probability - exact) / np.where(sure, 1, found.error))[~sure])
     score = np.concatenate(scores)
     assert np.abs(score).max() < 5
-    assert 0.92 <= np.mean(np.abs(score) < 1.96) <= 0.985
-    assert 0.85 < score.std() < 1.2
+    assert 0.92 <= np.mean(np.abs(score) < 1.96) <= 0.98
+    assert 0.9 < score.std() < 1.1
 
 
 def test_gibbs_alone_does_not_cross_between_modes():
