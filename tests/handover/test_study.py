@@ -1,5 +1,7 @@
 """The study: counts, statistics, survey files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -17,8 +19,9 @@ from mlnlite.domains.handover.study.analysis import (
 )
 from mlnlite.domains.handover.study.keywords import keyword_shares, mentions
 from mlnlite.domains.handover.study.preferences import association, bayes_ceiling, published
+from mlnlite.domains.handover.study.report import report
 from mlnlite.domains.handover.study.simulate import simulate
-from mlnlite.domains.handover.study.survey import read_survey, write_survey
+from mlnlite.domains.handover.study.survey import Survey, read_survey, write_survey
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -59,6 +62,20 @@ def test_ordinal_check_against_scipy():
     first = next(o for o in ordinal_check(survey) if (o.aspect, o.test, o.group) == ("safety", "Friedman", "L"))
     chosen = survey.ratings[np.array(survey.levels) == "L", :, 0]
     assert first.statistic == pytest.approx(friedmanchisquare(*chosen.T).statistic)
+
+
+@pytest.mark.parametrize("chosen", [range(1), range(5), [0, 200], range(200, 259)])
+def test_small_surveys_are_reported_without_what_they_cannot_tell(chosen):
+    whole, chosen = simulate(), list(chosen)
+    pick = lambda column: tuple(column[i] for i in chosen)  # noqa: E731
+    small = Survey("few", pick(whole.levels), pick(whole.preferred), whole.ratings[chosen], whole.ranks[chosen],
+                   pick(whole.comments))  # fmt: skip
+    text = report(small)
+    assert f"{len(chosen)} people" in text
+    assert ("Not tested" in text) == (len(set(small.levels)) < 2 or len(chosen) < 4)
+    assert "nan" not in text
+    flat = replace(small, ratings=np.full_like(small.ratings, 3))
+    assert mixed_anova(flat) == ordinal_check(flat) == ()
 
 
 def test_concordance():

@@ -85,9 +85,17 @@ class Consensus:
 
 
 def mixed_anova(survey: Survey) -> tuple[Effect, ...]:
-    """Level (between) x method (within) for each rated aspect."""
-    out = []
+    """Level (between) x method (within) for each rated aspect, over levels of several people.
+
+    Nothing of an aspect that all rate alike, or if there are no two such levels.
+    """
+    several, out = _of_several(survey), list[Effect]()
+    if len(set(several.levels)) < 2:
+        return ()
+    survey = several
     for k, aspect in enumerate(RATED):
+        if not survey.ratings[:, :, k].std(axis=0).any():
+            continue
         frame = pd.DataFrame({
             "participant": np.repeat(np.arange(survey.n), len(METHODS)),
             "level": np.repeat(np.array(survey.levels, dtype=object), len(METHODS)),
@@ -99,6 +107,14 @@ def mixed_anova(survey: Survey) -> tuple[Effect, ...]:
         )
         out += [_effect(aspect, row) for row in table.to_dict("records")]
     return tuple(out)
+
+
+def _of_several(survey: Survey) -> Survey:
+    """The people of levels that have more than one."""
+    chosen = [i for i, level in enumerate(survey.levels) if survey.levels.count(level) > 1]
+    words = ([column[i] for i in chosen] for column in (survey.levels, survey.preferred, survey.comments))
+    levels, preferred, comments = map(tuple, words)
+    return Survey(survey.source, levels, preferred, survey.ratings[chosen], survey.ranks[chosen], comments)
 
 
 def _effect(aspect: str, row: dict[str, object]) -> Effect:
@@ -114,17 +130,25 @@ def _effect(aspect: str, row: dict[str, object]) -> Effect:
 
 
 def ordinal_check(survey: Survey) -> tuple[Ordinal, ...]:
-    """Friedman's test of the methods within each level, Kruskal's of the levels within each method."""
+    """Friedman's test of the methods within each level, Kruskal's of the levels within each method.
+
+    Over levels of several people; no test of ratings that are all alike.
+    """
     found: list[Ordinal] = []
     levels = np.array(survey.levels)
     names = [name for name in published().levels if (levels == name).sum() > 1]
     for k, aspect in enumerate(RATED):
         for name in names:
             columns = survey.ratings[levels == name, :, k].T
+            if (columns == columns[0]).all():
+                continue
             chi2, p = friedmanchisquare(*columns)
             found.append(Ordinal(aspect, "Friedman", name, float(chi2), float(p), float(chi2) / (2 * columns.shape[1])))
         for j, method in enumerate(METHODS):
-            h, p = kruskal(*(survey.ratings[levels == name, j, k] for name in names))
+            groups = [survey.ratings[levels == name, j, k] for name in names]
+            if len(groups) < 2 or len(set(np.concatenate(groups).tolist())) < 2:
+                continue
+            h, p = kruskal(*groups)
             found.append(Ordinal(aspect, "Kruskal", method, float(h), float(p), float(h) / (survey.n - 1)))
     corrected = holm([one.p for one in found])
     return tuple(

@@ -64,11 +64,12 @@ def _anova(survey: Survey) -> str:
              "Level between people, method within; p of the method is Greenhouse-Geisser corrected.", "",
              "| aspect | effect | degrees of freedom | F | p | partial eta squared |",
              "|---|---|---|---|---|---|"]  # fmt: skip
-    for e in analysis.mixed_anova(survey):
+    found = analysis.mixed_anova(survey)
+    for e in found:
         lines.append(
             f"| {e.aspect} | {e.source} | {e.dof[0]:.0f}, {e.dof[1]:.0f} | {e.f:.2f} | {e.p:.2g} | {e.eta2:.3f} |"
         )
-    return "\n".join(lines)
+    return "\n".join(lines if found else [*lines[:2], _TOO_FEW])
 
 
 def _ordinal(survey: Survey) -> str:
@@ -76,9 +77,13 @@ def _ordinal(survey: Survey) -> str:
              "Friedman: methods within a level (effect: Kendall's W); Kruskal: levels within a method (effect: epsilon "
              "squared). Holm-corrected.", "", "| aspect | test | group | statistic | p | effect |",
              "|---|---|---|---|---|---|"]  # fmt: skip
-    for o in analysis.ordinal_check(survey):
+    found = analysis.ordinal_check(survey)
+    for o in found:
         lines.append(f"| {o.aspect} | {o.test} | {o.group} | {o.statistic:.2f} | {o.p:.2g} | {o.effect:.3f} |")
-    return "\n".join(lines)
+    return "\n".join(lines if found else [*lines[:2], _TOO_FEW])
+
+
+_TOO_FEW = "Not tested: that takes two levels of two people each, and ratings that differ."
 
 
 def _ranks(survey: Survey) -> str:
