@@ -90,8 +90,9 @@ def read_bulk(text: str, start: int, end: int, progress: Progress) -> Iterator[P
     Yields:
         Facts; or start and end of lines that are left, when `progress` is theirs.
     """
+    size = CHUNK
     while start < end:
-        stop = min(text.find("\n", start + CHUNK) + 1 or len(text), end)
+        stop = min(text.find("\n", start + size) + 1 or len(text), end)
         lines = _lines(text[start:stop].encode())
         after = np.flatnonzero(lines.letters & 0xC0 == 0x80)  # bytes that go on with a character
         known = _separators(lines)
@@ -103,9 +104,13 @@ def read_bulk(text: str, start: int, end: int, progress: Progress) -> Iterator[P
         others = np.flatnonzero(~known)
         others = others[~_blank(lines, others)]
         left = _stretches(np.flatnonzero(known), others, n_lines)
-        if left and stop < end and left[-1][1] == n_lines and left[-1][0] > 0:  # it may go on in the next chunk
+        if left and stop < end and left[-1][1] == n_lines:  # it may go on in the next chunk
+            if left[-1][0] == 0:
+                size *= 2
+                continue
             n_lines, _ = left.pop()
             stop = start + int(_characters(_begin(lines, n_lines), after))
+        size = CHUNK
         for stretch in left:
             progress.database = int(database[stretch[0]])
             places = start + _characters(_begin(lines, np.array(stretch)), after)

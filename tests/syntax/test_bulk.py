@@ -85,6 +85,7 @@ def compare(text, size):
 @given(
     st.lists(st.sampled_from(LINES), max_size=12), st.sampled_from(["\n", "\n\n", "\r\n"]), st.sampled_from([40, 10**6])
 )
+@example(["0.0 Smokes(Bob)", "0.0 Smokes(Bob)", "person = {Eva,", "  Fritz}"], "\n", 40)
 @example(["---", "person = {Eva,", "  Fritz}", "Rain"], "\n", 40)
 @example(list(LINES), "\n", 10**6)
 def test_any_lines(lines, newline, size):
