@@ -15,6 +15,7 @@ from mlnlite.infer.answer import marginal
 from mlnlite.learn import metrics
 from mlnlite.learn.content import content
 from mlnlite.learn.metrics import Calibration, Predictions
+from mlnlite.learn.missing import closed_but, has_marks, marks_of
 from mlnlite.model.evidence import Evidence, Facts
 from mlnlite.model.facts import closed
 from mlnlite.model.model import Model
@@ -145,18 +146,21 @@ def predictions(
 ) -> dict[int, dict[str, Predictions]]:
     """What is predicted of each database that has labels, by its number and the predicate. Arguments as `evaluate`."""
     others = [name for name in evidence.predicates if name not in targets]
-    evidence = closed(evidence, _closable(evidence, others) if closed_world == "all" else closed_world)
+    closing = set(_closable(evidence, others) if closed_world == "all" else closed_world)
+    marked = has_marks(evidence) if (closing | set(targets)) & set(evidence.soft) else False
+    evidence = closed(evidence, closing - set(evidence.soft) if marked else closing)
     explicit = {name for name in targets if not evidence.facts[name].truth.all()}
     found: dict[int, dict[str, Predictions]] = {}
     answers: dict[tuple[bytes, ...], Mapping[str, float]] = {}
     for i in np.unique(np.concatenate([evidence.facts[name].database for name in targets])).tolist():
-        one = one_database(evidence, i)
+        one, marks = marks_of(one_database(evidence, i)) if marked else (one_database(evidence, i), {})
+        one = closed_but(one, closing & set(marks), marks)
         same = content(one, others)
         if same not in answers:
             answers[same] = marginal(model, _without(one, targets), targets)
         answer = answers[same]
         found[i] = {
-            name: _predictions(one, name, answer, explicit=name in explicit)
+            name: _predictions(one, name, answer, marks.get(name), explicit=name in explicit)
             for name in targets
             if len(one.facts[name].truth)
         }
@@ -230,14 +234,21 @@ def _truth(evidence: Evidence, name: str, atoms: NDArray[np.int32]) -> Float:
 # --- one predicate in one database
 
 
-def _predictions(evidence: Evidence, name: str, answer: Mapping[str, float], *, explicit: bool) -> Predictions:
-    """Labels of one database; the values of a block are its constants' ids, and after them "none"."""
+def _predictions(
+    evidence: Evidence, name: str, answer: Mapping[str, float], marks: Int64 | None, *, explicit: bool
+) -> Predictions:
+    """Labels of one database; the values of a block are its constants' ids, and after them "none".
+
+    Atoms marked `?` have no label.
+    """
     predicate = evidence.predicates[name]
     atoms = _atoms(evidence, predicate)
     p = np.array([answer[text] for text in evidence.atom_texts(evidence.atom_number(name, atoms))])
     truth = _truth(evidence, name, atoms)
     if not explicit:
         truth = np.nan_to_num(truth)
+    if marks is not None:
+        truth[np.isin(evidence.atom_number(name, atoms), marks)] = np.nan
     if predicate.value is None:
         known = ~np.isnan(truth)
         return Predictions(np.stack([1 - p, p], axis=1)[known], truth[known].astype(np.int64), binary=True)

@@ -76,3 +76,13 @@ def test_mistakes(names, message):
     model = ml.model_from_text(COIN)
     with pytest.raises(ml.QueryMistake, match=message):
         ml.evaluate(model, ml.evidence_from_text("P(A)", model=model), predicates=names)
+
+
+def test_marked_atoms_have_no_label_and_are_not_false():
+    model = "Q(thing)\nP(thing)\nlog(0.8/0.2) P(x)\n-5 Q(x) ^ P(x)"
+    complete = score(model, "P(A)\nQ(B)\nthing = {C}", "P")
+    assert complete.n == 3
+    marked = score(model, "P(A)\nQ(B)\n?P(C)", "P")
+    assert marked.n == 2
+    opened = score(model, "P(A)\n?Q(A)", "P")
+    assert opened.log_loss > score(model, "P(A)", "P").log_loss + 0.1
