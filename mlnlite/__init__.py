@@ -28,6 +28,7 @@ from mlnlite.plugins import Plugin as Plugin
 if TYPE_CHECKING:
     from mlnlite.ground.ground import ground as ground
     from mlnlite.ground.network import Network as Network
+    from mlnlite.infer.alternatives import map_states as map_states
     from mlnlite.infer.answer import map_state as map_state
     from mlnlite.infer.answer import marginal as marginal
     from mlnlite.infer.joint import joint as joint
@@ -78,6 +79,7 @@ _HOMES = {
     "ground": "mlnlite.ground.ground",
     "Network": "mlnlite.ground.network",
     "map_state": "mlnlite.infer.answer",
+    "map_states": "mlnlite.infer.alternatives",
     "marginal": "mlnlite.infer.answer",
     "joint": "mlnlite.infer.joint",
     "Score": "mlnlite.infer.scored",

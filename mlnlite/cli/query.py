@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, cast
 
@@ -72,6 +73,10 @@ class _Options(TypedDict):
     gap: float
     margins: bool
     joint: bool
+    k: int
+    diverse: float | None
+    why: bool
+    explain: str | None
     width_limit: int | None
     dialect: Dialect | None
     format: Literal["text", "json", "csv"]
@@ -122,6 +127,15 @@ class _Options(TypedDict):
     show_default=True,
     help="Of the most probable world: what share of its cost it may be away from the best.",
 )
+@click.option("--k", type=click.IntRange(min=1), default=1, show_default=True, help="How many most probable worlds.")
+@click.option(
+    "--diverse",
+    type=click.FloatRange(min=0),
+    metavar="PENALTY",
+    help="With --k: good worlds that differ; each loses so much log-weight for every value as in one before.",
+)
+@click.option("--why", is_flag=True, help="List the groundings that the most probable world pays for.")
+@click.option("--explain", metavar="ATOM", help="Show the best world in which this atom is the other way round.")
 @click.option("--margins", is_flag=True, help="For each atom of that world, what the opposite would lose.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Where chance starts.")
 @click.option(
@@ -146,9 +160,15 @@ def query(**options: Unpack[_Options]) -> None:
     with working("reading"):
         model = opened(ml.read_model(*options["models"], dialect=options["dialect"]), names(options["open_world"]))
         evidence = evidence_of_one_world(model, options["evidence"], options["database"])
+    whole = options["output"] is not None
+    if options["k"] > 1:
+        with working("inferring"):
+            states = _states(model, evidence, items, options)
+        emit(_several(states, options["format"], whole=whole), options["output"])
+        return
     with working("inferring"):
         answer = _answer(model, evidence, items, options)
-    emit(_formatted(answer, options["format"], whole=options["output"] is not None), options["output"])
+    emit(_formatted(answer, options["format"], whole=whole), options["output"])
 
 
 def _answer(model: Model, evidence: Evidence, items: list[str], options: _Options) -> Marginals | MapState:
@@ -167,6 +187,8 @@ def _answer(model: Model, evidence: Evidence, items: list[str], options: _Option
             seed=options["seed"],
             gap=options["gap"],
             margins=options["margins"],
+            why=options["why"],
+            explain=options["explain"],
         )
     ask = ml.joint if options["joint"] else ml.marginal
     return ask(
@@ -183,6 +205,28 @@ def _answer(model: Model, evidence: Evidence, items: list[str], options: _Option
     )
 
 
+def _states(model: Model, evidence: Evidence, items: list[str], options: _Options) -> tuple[MapState, ...]:
+    import mlnlite as ml
+
+    return ml.map_states(
+        model,
+        evidence,
+        items or None,
+        k=options["k"],
+        diverse=options["diverse"],
+        closed_world=closed_world(model, items, names(options["closed_world"]), names(options["open_world"])),
+        time_limit=options["time_limit"],
+        seed=options["seed"],
+    )
+
+
+def _several(states: tuple[MapState, ...], format_name: str, *, whole: bool) -> str:
+    """Several worlds as text, one after the other, or as a list in JSON."""
+    if format_name == "json":
+        return json.dumps([state.to_dict() for state in states], indent=2)
+    return "\n\n".join(_formatted(state, format_name, whole=whole) for state in states)
+
+
 def _verify(options: _Options, items: list[str]) -> None:
     """Complains about options that do not fit the task."""
     tasks = _METHODS[options["method"]]
@@ -192,8 +236,23 @@ def _verify(options: _Options, items: list[str]) -> None:
         raise click.UsageError("--joint is for --task marginal")
     if options["task"] == "map" and options["width_limit"] is not None:
         raise click.UsageError("--width-limit is for --task marginal; --task map takes --time-limit")
+    _verify_worlds(options)
     if options["task"] == "marginal" and not items:
         raise QueryMistake("nothing is asked", "name predicates, atoms or formulas: `-q Smokes,Cancer(Ann)`")
+
+
+def _verify_worlds(options: _Options) -> None:
+    """Complains about options of most probable worlds that do not fit each other."""
+    of_map = ("k", "diverse", "why", "explain", "margins", "gap")
+    for name in of_map if options["task"] == "marginal" else ():
+        if options[name] not in (None, False, 0.0) and (name, options[name]) != ("k", 1):  # type: ignore[literal-required]
+            raise click.UsageError(f"--{name} is for --task map")
+    if options["diverse"] is not None and options["k"] == 1:
+        raise click.UsageError("--diverse needs --k: how many worlds that differ")
+    if options["k"] > 1 and (options["margins"] or options["why"] or options["explain"] or options["method"] != "auto"):
+        raise click.UsageError("--k goes without --margins, --why, --explain and --method")
+    if options["k"] > 1 and options["format"] == "csv":
+        raise click.UsageError("--k writes text or JSON")
 
 
 def _formatted(answer: Marginals | MapState, format_name: str, *, whole: bool) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -21,16 +21,16 @@ from mlnlite.infer.liftable import lifted_marginals
 from mlnlite.infer.marginal import WIDTH_LIMIT
 from mlnlite.infer.marginals import EVIDENCE, marginals_from
 from mlnlite.infer.query import Question, atom_numbers, question_of
-from mlnlite.infer.score import costs, counts
+from mlnlite.infer.score import costs
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
 from mlnlite.model.formulas import AtomRef, Expression
 from mlnlite.model.model import Model
 from mlnlite.model.propositional import Proposition, simplified
-from mlnlite.model.unparse import row_text
 from mlnlite.results import MapState, Marginals, Statistics, Violation
 
 if TYPE_CHECKING:
+    from mlnlite.infer.map import BestWorld
     from mlnlite.infer.rungs import Method
     from mlnlite.infer.waiting import Lazy
 
@@ -83,7 +83,7 @@ def marginal(  # noqa: PLR0913
         lifted = lifted_marginals(model, known, query, others_closed=closed_world == "all", must=method == "lifted")
         if lifted is not None:
             return lifted
-    asked = _ask(model, evidence, query, closed_world, engine)
+    asked = ask(model, evidence, query, closed_world, engine)
     return marginals_for(asked.network, asked.question, approach, asked.seconds)
 
 
@@ -124,6 +124,8 @@ def map_state(  # noqa: PLR0913
     seed: int = 0,
     gap: float = 0.0,
     margins: bool = False,
+    why: bool = False,
+    explain: str | None = None,
     engine: Engine | None = None,
 ) -> MapState:
     """A most probable world given evidence, with a bound that proves it or says how much better another could be.
@@ -139,6 +141,8 @@ def map_state(  # noqa: PLR0913
         seed: of the search.
         gap: good enough is a world that costs at most this share more than the best one.
         margins: also find for each atom how much worse the best world is in which it is the other way round.
+        why: also list the groundings that the world pays for.
+        explain: an atom of which to show the best world in which it is the other way round.
         engine: what runs the grounding plans; by default chosen by size.
 
     Raises:
@@ -146,10 +150,10 @@ def map_state(  # noqa: PLR0913
         Contradiction: if no world satisfies the evidence and the hard formulas.
         LimitReached: if there is no answer within the limits.
     """
-    asked = _ask(model, evidence, query, closed_world, engine, waits=True)
+    asked = ask(model, evidence, query, closed_world, engine, waits=True)
     return map_state_for(
         asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, gap=gap, margins=margins,
-        lazy=asked.lazy, ground_seconds=asked.seconds,
+        why=why, explain=explain, lazy=asked.lazy, ground_seconds=asked.seconds,
     )  # fmt: skip
 
 
@@ -162,6 +166,8 @@ def map_state_for(  # noqa: PLR0913
     seed: int = 0,
     gap: float = 0.0,
     margins: bool = False,
+    why: bool = False,
+    explain: str | None = None,
     lazy: Lazy | None = None,
     ground_seconds: float = 0.0,
 ) -> MapState:
@@ -181,11 +187,27 @@ def map_state_for(  # noqa: PLR0913
 
         lazy, best = map_lazily(lazy, Options(method, in_seconds(time_limit), seed, gap))
         network = lazy.network
+    seconds = {"ground": ground_seconds, "infer": perf_counter() - start}
+    state = state_of(network, question, best, seconds)
+    index, _ = _locate(network, question.atoms)
+    if margins:
+        state = replace(state, margins=_margins(network, best.truth, index, time_limit))
+    if why or explain is not None:
+        from mlnlite.infer.why import alternative, paid_groundings, paid_texts
+
+        texts = paid_texts(network, best.truth)
+        state = replace(state, paid=tuple(paid_groundings(network, best.truth, texts)) if why else ())
+        if explain is not None:
+            state = replace(state, alternative=alternative(network, best.truth, explain, method, time_limit))
+    return state
+
+
+def state_of(network: Network, question: Question, best: BestWorld, seconds: Mapping[str, float]) -> MapState:
+    """A world as an answer to a question."""
     index, truth = _locate(network, question.atoms)
     truth[index >= 0] = best.truth[index[index >= 0]]
     methods = [best.component_method[best.component[i]] if i >= 0 else EVIDENCE for i in index.tolist()]
     total, open_ = costs(network, best.truth)
-    seconds = {"ground": ground_seconds, "infer": perf_counter() - start}
     return MapState(
         names=tuple(_texts(network.evidence, question.atoms)),
         truth=truth,
@@ -196,7 +218,6 @@ def map_state_for(  # noqa: PLR0913
         cost=float(total.sum()),
         open_cost=float(open_.sum()),
         gap=best.gap,
-        margins=_margins(network, best.truth, index, time_limit) if margins else None,
         violated=tuple(_violations(network, best.truth)),
         statistics=Statistics(
             network.n_atoms, network.n_factors, len(best.component_status), best.largest_table, seconds
@@ -219,14 +240,16 @@ def _margins(network: Network, truth: NDArray[np.bool_], index: Int64, time_limi
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class Asked:
+    """A question with the network that answers it, and how long grounding took [s]."""
+
     question: Question
     network: Network
     seconds: float
     lazy: Lazy | None = None
 
 
-def _ask(
+def ask(
     model: Model,
     evidence: Evidence,
     query: str | Sequence[str] | None,
@@ -234,7 +257,8 @@ def _ask(
     engine: Engine | None,
     *,
     waits: bool = False,
-) -> _Asked:
+) -> Asked:
+    """Grounds what a question is about; see `marginal`. `waits`: formulas of very many groundings may wait."""
     start = perf_counter()
     question = None if query is None else question_of(query, model, evidence)
     evidence = _closed(evidence, closed_world, frozenset() if question is None else question.predicates)
@@ -246,7 +270,7 @@ def _ask(
         lazy = without_lazy(model, evidence, waiting, atoms, engine) if waiting else None
     network = ground(model, evidence, query=atoms, engine=engine) if lazy is None else lazy.network
     question = question or Question(network.atoms, (), frozenset())
-    return _Asked(question, network, perf_counter() - start, lazy)
+    return Asked(question, network, perf_counter() - start, lazy)
 
 
 def _closed(evidence: Evidence, closed_world: str | Iterable[str], asked: frozenset[str]) -> Evidence:
@@ -302,16 +326,7 @@ def _over_network(expression: Expression, network: Network) -> Expression:
 
 def _violations(network: Network, truth: NDArray[np.bool_]) -> list[Violation]:
     """The soft formulas that a world pays for, in groundings that evidence leaves open."""
-    true = counts(network, truth) - network.decided_true
-    open_ = network.n_open
-    soft = np.isfinite(network.weights)
-    paid = np.where(network.weights > 0, open_ - true, true) * (soft & (network.weights != 0))
-    first = np.searchsorted(network.template, np.arange(len(network.model.templates)))
-    found = []
-    for w in np.flatnonzero(paid).tolist():
-        template = network.model.templates[network.template[w]]
-        text = (
-            row_text(template, network.model, w - int(first[network.template[w]])) if template.keys else template.text
-        )
-        found.append(Violation(text, int(paid[w]), float(network.weights[w])))
-    return found
+    from mlnlite.infer.why import n_paid, paid_texts
+
+    paid = n_paid(network, truth)
+    return [Violation(text, int(paid[w]), float(network.weights[w])) for w, text in paid_texts(network, truth).items()]

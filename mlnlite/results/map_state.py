@@ -11,6 +11,7 @@ import numpy as np
 
 from mlnlite.results.rows import Bool, Float, Int64, Rows, Statistics
 from mlnlite.results.table import json_number, order_of_rows
+from mlnlite.results.why import Alternative, PaidGrounding
 
 _PAID = 10
 
@@ -55,6 +56,8 @@ class MapState(Rows[bool]):
         gap: how much larger the log-weight of another world (or smaller its cost) could at most be.
         margins: shape (n,), how much log-weight the best world loses in which the atom is the other way round:
             infinity if it cannot be, nan if that is not known; None if nobody asked.
+        paid: the groundings of soft formulas that the world pays for, dearest first, if somebody asked.
+        alternative: the best world in which one atom is the other way round, if somebody asked.
     """
 
     truth: Bool
@@ -69,6 +72,8 @@ class MapState(Rows[bool]):
     open_cost: float = float("nan")
     gap: float = float("nan")
     margins: Float | None = None
+    paid: tuple[PaidGrounding, ...] = ()
+    alternative: Alternative | None = None
 
     def __post_init__(self) -> None:
         """The gap follows from bound and log-weight if it is not given."""
@@ -100,6 +105,9 @@ class MapState(Rows[bool]):
         paid = [f"pays {v.cost:.4g} for {v.formula} ({v.n_groundings:,} x {v.weight:.4g})" for v in worst[:_PAID]]
         rest = worst[_PAID:]
         paid += [f"pays {sum(v.cost for v in rest):.4g} for {len(rest):,} more formulas"] if rest else []
+        paid += [f"  {grounding}" for grounding in self.paid[:_PAID]]
+        paid += [f"  and {len(self.paid) - _PAID:,} more groundings"] if len(self.paid) > _PAID else []
+        paid += [] if self.alternative is None else [str(self.alternative)]
         weight = f"log-weight {self.log_weight:.6f}, bound {self.bound:.6f}, gap {self.gap:.3g}"
         summary = [f"status: {self.status}, {weight}"]
         if isfinite(self.cost):
@@ -141,6 +149,8 @@ class MapState(Rows[bool]):
             "state": self.state,
             "margins": margins,
             "violated": paid,
+            "paid": [grounding.to_dict() for grounding in self.paid],
+            "alternative": None if self.alternative is None else self.alternative.to_dict(),
             "statistics": self.statistics.to_dict(),
         }
 
