@@ -59,7 +59,7 @@ def paid_groundings(
     """
     world = world_evidence(network, truth)
     tables = {**tables_of(world), **row_tables(network.model)}
-    run = (engine or engine_for(tables)).load(tables)
+    run = (engine or engine_for()).load(tables)
     found: list[PaidGrounding] = []
     for t in sorted({int(network.template[w]) for w in texts}):
         source = source_of(t, network.model.templates[t], world)
