@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -200,3 +201,17 @@ def test_every_command_option_and_public_name_is_in_the_reference():
         options = [o for p in entry.params for o in p.opts if o.startswith("-")]
         assert [o for o in options if f"`{o}" not in section and f"{o}`" not in section] == []
     assert [name for name in package._PUBLIC if f"`{name}`" not in page] == []
+
+
+def test_demo_hands_an_unseen_object_over(tmp_path, monkeypatch):
+    from mlnlite.domains.handover.instances import generate
+
+    monkeypatch.setattr(generate, "generate", partial(generate.generate, n_synthetic=150))
+    found = _run("demo", "-o", str(tmp_path))
+    assert found.exit_code == 0, found.output
+    assert "of 31 objects, mug left out" in found.output
+    assert "leave free    handle" in found.output
+    assert "method ours" in found.output
+    assert "simulated: done" in found.output
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"handover.html", "handover.png", "reach.png", "preferences.png", "execution.jsonl"} <= names

@@ -9,10 +9,13 @@ from scipy.spatial.transform import Rotation
 
 import mlnlite as ml
 from mlnlite.domains.handover.evaluation import metrics, models
+from mlnlite.domains.handover.evaluation.goals import goals_section
 from mlnlite.domains.handover.evaluation.grasp_choice import compare_grasps
 from mlnlite.domains.handover.evaluation.protocol import PAPER_TEST, is_near, predictions, run_split, splits
+from mlnlite.domains.handover.evaluation.protocol_tables import protocol_section
 from mlnlite.domains.handover.evaluation.published import blocks, keys, read_published
-from mlnlite.domains.handover.evaluation.real import METHOD, rows_of
+from mlnlite.domains.handover.evaluation.quality import VARIANTS, measured_of, quality_section
+from mlnlite.domains.handover.evaluation.real import METHOD, REGION, HeldOut, rows_of
 from mlnlite.domains.handover.evaluation.schemes import grouped_folds
 from mlnlite.domains.handover.evaluation.tables import paper_is_lookup
 from mlnlite.domains.handover.instances.generate import facts_of, generate
@@ -101,6 +104,32 @@ def test_unseen_objects_of_the_paper():
             assert share[model, measure, "synthetic", "all"] >= 0.98
     assert share["chance", "method", "synthetic", "all"] == pytest.approx(1 / 3)
     assert share["chance", "method", "synthetic", "all"] < share["majority", "method", "synthetic", "all"]
+
+
+def test_the_report_keeps_sources_apart_and_says_what_is_missed():
+    found = run_split(generate("sampled", n_synthetic=300), {}, ("mug", "book", "comb"))
+    text = protocol_section({"sampled": [found]})
+    assert "### Labels sampled, synthetic rows" in text
+    assert "### Labels sampled, rows of the study" in text
+    assert {key[2] for key in found.scores} == {"synthetic", "study"}
+    truth, groups = np.array([0, 1, 1, 0]), ("a", "a", "b", "b")
+    good, bad = np.eye(2)[truth] * 0.8 + 0.1, np.full((4, 2), 0.5)
+    for mine, holds in ((good, "yes"), (bad, "**no**")):
+        probabilities = {"majority": good * 0.9 + 0.05, "ours": mine}
+        one = HeldOut("key", REGION, truth, groups, np.zeros(4, int), probabilities, {}, 1.0)
+        goals = [line for line in goals_section({}, [one]).splitlines() if "log-loss" in line]
+        assert goals[0].endswith(f"| {holds} |")
+
+
+def test_each_cost_left_out_is_missed_where_it_counts():
+    found = {r.variant: r for r in measured_of(("pr2",), "bottle") if r.level == "L"}
+    assert set(found) == set(VARIANTS)
+    ours = found["ours"]
+    assert len(ours.passed) == 5
+    assert found["ours without C_A"].apart <= ours.apart
+    assert found["ours without C_S"].safety <= ours.safety
+    assert found["ours without C_R"].reach > ours.reach
+    assert "| ours without C_R |" in quality_section(list(found.values()), 1)
 
 
 def test_poses_are_right_if_the_same_cell_is_and_no_pose_is_judged_where_there_is_none():

@@ -26,7 +26,6 @@ def draw_protocol(found: Mapping[str, Sequence[Split]]) -> Figure:
         axis.set(title=f"labels {labels}", xlabel="synthetic rows right on 10 unseen objects [%]", xlim=(0, 102),
                  yticks=range(1, len(lines) + 1), yticklabels=[f"{model}, {measure}" for model, measure in lines],
                  )  # fmt: skip
-        axis.invert_yaxis()
     return figure
 
 

@@ -27,7 +27,7 @@ def goals_section(protocol: Mapping[str, Sequence[Split]], real: Sequence[HeldOu
     """All goals, as Markdown."""
     lines = ["## Goals", "", "Differences are paired, with 95 % intervals; if one includes 0, chance could do it.",
              "", "| goal | found | holds |", "|---|---|---|"]  # fmt: skip
-    goals = [*_unseen(protocol), *(goal for one in real for goal in _held_out(one))]
+    goals = [*(_unseen(protocol) if protocol else []), *(goal for one in real for goal in _held_out(one))]
     lines += [f"| {wanted} | {found} | {'yes' if holds else '**no**'} |" for wanted, found, holds in goals]
     return "\n".join([*lines, ""])
 

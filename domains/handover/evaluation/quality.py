@@ -61,12 +61,13 @@ class Result:
 
 def measure(things: Sequence[str], robots: Sequence[str] = ("pr2", "panda"), *, workers: int = 2) -> tuple[Result, ...]:
     """All variants on objects, levels and robots."""
-    work = partial(_measured, tuple(robots))
+    work = partial(measured_of, tuple(robots))
     with ProcessPoolExecutor(workers) as pool:
         return tuple(result for part in pool.map(work, things) for result in part)
 
 
-def _measured(robots: tuple[str, ...], thing: str) -> list[Result]:
+def measured_of(robots: tuple[str, ...], thing: str) -> list[Result]:
+    """All variants of one object, at all levels, by some robots."""
     scenes = [make_scene(thing, receiver=level.name, robot=robot) for robot in robots for level in read_levels()]
     return [_result(scene, variant) for scene in scenes for variant in VARIANTS]
 
