@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import repeat
 from typing import ClassVar
@@ -49,6 +49,8 @@ class _Reading:
     def ids(self, type_name: str, names: Sequence[str]) -> NDArray[np.int32]:
         """Ids of constants, new ones for those not seen before."""
         index = self.types[type_name]
+        if not index:
+            index.update(zip(dict.fromkeys(names), range(len(names)), strict=False))
         found = np.fromiter(map(index.get, names, repeat(-1)), np.int32, len(names))
         for i in np.flatnonzero(found < 0).tolist():
             found[i] = index.setdefault(names[i], len(index))
@@ -249,11 +251,12 @@ def _sorted(name: str, reading: _Reading) -> Facts:
     columns = reading.columns.get(name)
     if columns is None:
         return Facts(np.empty(0, np.int32), np.empty((0, predicate.arity), np.int32), np.empty(0, np.bool_))
+    sizes = [len(reading.types[t]) for t in predicate.types]
     database, arguments = np.concatenate(columns.database), np.concatenate(columns.arguments)
-    truth = np.concatenate(columns.truth)
-    order, again = _order(database, arguments, [len(reading.types[t]) for t in predicate.types])
-    if order is not None:
-        database, arguments, truth = database[order], arguments[order], truth[order]
+    facts, order = _ranked(database, arguments, np.concatenate(columns.truth), sizes)
+    database, arguments, truth = facts.database, facts.arguments, facts.truth
+    again = np.zeros(len(truth), np.bool_)
+    again[1:] = (database[1:] == database[:-1]) & (arguments[1:] == arguments[:-1]).all(axis=1)
     where = _Places(columns, order)
     for i in np.flatnonzero(again & (truth != np.roll(truth, 1)))[:MOST_MISTAKES].tolist():
         first, second = where.spans([i - 1, i], reading.sources)
@@ -278,39 +281,41 @@ class _Places:
     """Where facts stand, in their order."""
 
     columns: _Columns
-    order: NDArray[np.int64] | None
+    order: Callable[[], NDArray[np.int64]]
 
     def spans(self, rows: Sequence[int], sources: Sequence[Source]) -> list[Span]:
         """The places of some of them, the first one first."""
         found = []
-        for row in rows if self.order is None else self.order[rows].tolist():
+        for row in self.order()[rows].tolist():
             file, offset = place(self.columns, row)
             found.append(_fact_span(sources[file], offset))
         return sorted(found, key=lambda s: (s.source.name, s.start))
 
 
-def _order(
-    database: NDArray[np.int32], arguments: NDArray[np.int32], sizes: Sequence[int]
-) -> tuple[NDArray[np.int64] | None, NDArray[np.bool_]]:
-    """The order of rows by database and arguments (None: they are in order), and which of them then repeat the last.
+def _ranked(
+    database: NDArray[np.int32], arguments: NDArray[np.int32], truth: NDArray[np.bool_], sizes: Sequence[int]
+) -> tuple[Facts, Callable[[], NDArray[np.int64]]]:
+    """Facts in order of database and arguments, and what tells, if it is asked, the row that each came from.
 
-    Rows become numbers of one mixed radix, as long as these fit into 64 bits.
+    Rows become numbers of one mixed radix, as long as these fit into 64 bits: they sort several times as fast.
     """
-    again = np.zeros(len(database), bool)
-    if int(database.max(initial=0) + 1) * math.prod(sizes) < 2**63:
-        number = database.astype(np.int64)
-        for column, size in zip(arguments.T, sizes, strict=True):
-            number = number * size + column
-        if (number[1:] > number[:-1]).all():
-            return None, again
-        order = np.argsort(number, kind="stable")
-        number = number[order]
-        again[1:] = number[1:] == number[:-1]
-        return order, again
-    order = np.lexsort((*reversed(arguments.T), database))
-    database, arguments = database[order], arguments[order]
-    again[1:] = (database[1:] == database[:-1]) & (arguments[1:] == arguments[:-1]).all(axis=1)
-    return order, again
+    if 2 * int(database.max(initial=0) + 1) * math.prod(sizes) >= 2**63:
+        order = np.lexsort((*reversed(arguments.T), database))
+        return Facts(database[order], arguments[order], truth[order]), lambda: order
+    number = database.astype(np.int64)
+    for column, size in zip(arguments.T, sizes, strict=True):
+        number = number * size + column
+    number = 2 * number + truth
+    if (number[1:] > number[:-1]).all():
+        return Facts(database, arguments, truth), lambda: np.arange(len(number))
+    rest = np.sort(number)
+    found, ordered = (rest & 1).astype(np.bool_), np.empty_like(arguments)
+    rest >>= 1
+    for i in reversed(range(len(sizes))):
+        quotient = rest // sizes[i]
+        ordered[:, i] = rest - quotient * sizes[i]
+        rest = quotient
+    return Facts(rest.astype(np.int32), ordered, found), lambda: np.argsort(number, kind="stable")
 
 
 def _second_values(predicate: Predicate, facts: Facts) -> NDArray[np.int64]:

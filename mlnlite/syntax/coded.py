@@ -82,7 +82,7 @@ def numbered(keys: Keys) -> tuple[Codes, NDArray[np.int64]]:
     if 2 * len(starts) < len(keys):  # runs of equal keys, as in a sorted column
         codes, rows = numbered(keys[starts])
         return np.repeat(codes, np.diff(starts, append=len(keys))), starts[rows]
-    keys = np.where(keys == 0, ~np.uint64(0), keys)
+    keys = keys if keys.all() else np.where(keys == 0, ~np.uint64(0), keys)
     ranked = np.sort(keys)
     bits = max(4, int(4 * np.count_nonzero(ranked[1:] != ranked[:-1]) + 3).bit_length())
     slot = ((keys * _SPREAD) >> np.uint64(64 - bits)).astype(np.int32)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from mlnlite.errors import Diagnostic
 from mlnlite.source import Source, Span
@@ -23,19 +24,22 @@ _NEW_STATEMENT = re.compile(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Code:
     """A source without what the grammar does not see.
 
     Attributes:
         source: the source.
         text: its text with every character of a comment replaced by a blank.
-        bare: the same, and every character of a quoted constant replaced by `_`.
     """
 
     source: Source
     text: str
-    bare: str
+
+    @cached_property
+    def bare(self) -> str:
+        """The text with every character of a quoted constant replaced by `_`."""
+        return _COMMENT_OR_QUOTE.sub(lambda m: "_" * len(m[0]), self.text) if '"' in self.text else self.text
 
 
 _COMMENT_OR_QUOTE = re.compile(r'//[^\n]*|/\*.*?(?:\*/|\Z)|"(?:[^"\\\n]|\\[^\n])*"', re.DOTALL)
@@ -45,11 +49,10 @@ _VISIBLE = re.compile(r"[^\n]")
 def strip_comments(source: Source) -> tuple[Code, list[Diagnostic]]:
     """The code of a source, and a mistake if a comment is never closed."""
     text = source.text
-    if "//" not in text and "/*" not in text and '"' not in text:
-        return Code(source, text, text), []
+    if "//" not in text and "/*" not in text:
+        return Code(source, text), []
     code = _COMMENT_OR_QUOTE.sub(lambda m: m[0] if m[0][0] == '"' else _VISIBLE.sub(" ", m[0]), text)
-    bare = _COMMENT_OR_QUOTE.sub(lambda m: "_" * len(m[0]), code) if '"' in code else code
-    return Code(source, code, bare), list(_unclosed(source)) if "/*" in text else []
+    return Code(source, code), list(_unclosed(source)) if "/*" in text else []
 
 
 def _unclosed(source: Source) -> Iterator[Diagnostic]:

@@ -1,0 +1,35 @@
+"""The order of facts, by numbers and by columns: the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mlnlite as ml
+from mlnlite.model.facts import _ranked
+
+rows = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 3), st.integers(0, 4), st.booleans()), max_size=30)
+
+
+@given(rows)
+def test_order(facts):
+    database, first, second = (np.array([f[i] for f in facts], np.int32) for i in range(3))
+    arguments, truth = np.column_stack([first, second]), np.array([f[3] for f in facts], np.bool_)
+    small, order = _ranked(database, arguments, truth, [4, 5])
+    large, slow = _ranked(database, arguments, truth, [2**31, 2**31])
+    expected = sorted(facts)
+    assert list(zip(small.database, *small.arguments.T, small.truth, strict=True)) == expected
+    assert [facts[i] for i in order()] == expected
+    assert [f[:3] for f in zip(large.database, *large.arguments.T, strict=True)] == [f[:3] for f in expected]
+    assert [facts[i][:3] for i in slow()] == [f[:3] for f in expected]
+
+
+def test_places_of_contradictions():
+    model = ml.model_from_text("F(p, p)\nA(p, n!)\n1 F(x, y) ^ A(x, +n)")
+    text = "F(B, A)\nF(A, B)\n!F(B, A)\nA(B, 2)\nF(A, C)\nA(B, 1)\nF(A, B)"
+    with pytest.raises(ml.EvidenceMistake) as caught:
+        ml.evidence_from_text(text, model=model)
+    found = [(d.code, d.span.line, d.message[-10:]) for d in caught.value.diagnostics]
+    assert found == [("E304", 3, "<text>:1:1"), ("E305", 6, "<text>:4:1")]
