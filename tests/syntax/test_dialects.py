@@ -79,3 +79,22 @@ def test_comma_is_no_conjunction_in_alchemy():
 def test_no_chain_of_implications_outside_alchemy():
     with pytest.raises(SyntaxMistake, match="E106"):
         parse_model([Source("m.mln", "P(t)\n1 P(x) => P(y) => P(x)")], "lomrf")
+
+
+@pytest.mark.parametrize(
+    ("dialect", "text", "code"),
+    [
+        ("alchemy", 'P(t)\n#include "f.cpp"\n1 P(x)', "E110"),
+        ("alchemy", "t = {a, b}\nP(t)\n1 P(a)", "E120"),
+        ("tuffy", "P(t)\nQ(t)\nP(x) :- Q(x).\nQ(x) :- P(x).", "E110"),
+    ],
+)
+def test_not_read_as_something_else(dialect, text, code):
+    with pytest.raises(SyntaxMistake) as caught:
+        parse_model([Source("m.mln", text)], dialect)
+    assert {d.code for d in caught.value.diagnostics} == {code}
+
+
+def test_lines_of_pracmln_without_meaning():
+    program = parse_model([Source("m.mln", "P(t)\n#AdaptiveMLNDependency:P:t\n#group\n1 P(?x)\n")])
+    assert len(program.statements) == 2
