@@ -18,23 +18,28 @@ import mlnlite as ml
 from benchmarks import generators
 from mlnlite.infer.rungs import METHODS, Method
 
-DATA = Path(__file__).parents[2] / "shared" / "data" / "mln"
+DATA = Path(__file__).parents[2] / "shared" / "data"
 LIMIT = 60.0
 
 
-def _file(folder: str, program: str = "prog.mln"):
+def _file(folder: str, program: str = "prog.mln", evidence: str = "evidence.db"):
     def read():
         model = ml.read_model(DATA / folder / program)
-        return model, ml.read_evidence(DATA / folder / "evidence.db", model=model)
+        return model, ml.read_evidence(DATA / folder / evidence, model=model)
 
     return read
 
 
 WORKLOADS: dict[str, tuple[Callable[[], tuple], tuple[Method, ...]]] = {
-    "class": (_file("class"), ("auto", "ve", "ilp", "wcsp", "annealing")),
-    "cse": (_file("cse"), ("auto", "ilp", "wcsp", "annealing", "maxwalksat")),
-    "rc1000": (_file("rc1000", "prog-fixed.mln"), ("auto",)),
-    "smoke": (_file("smoke"), METHODS),
+    "class": (_file("mln/class"), ("auto", "ve", "ilp", "wcsp", "annealing")),
+    "cse": (_file("mln/cse"), ("auto", "ilp", "wcsp", "annealing", "maxwalksat")),
+    "rc1000": (_file("mln/rc1000", "prog-fixed.mln"), ("auto",)),
+    "smoke": (_file("mln/smoke"), METHODS),
+    "alarm-kreator": (_file("pracmln/alarm", "mlns/alarm-kreator.mln", "dbs/query1.db"), ("auto",)),
+    "alarm-noisyor": (_file("pracmln/alarm", "mlns/alarm-noisyor.mln", "dbs/query1.db"), ("auto",)),
+    "meals-1": (_file("pracmln/meals", "mlns/meals_any_for.mln", "dbs/query1.db"), ("auto",)),
+    "meals-2": (_file("pracmln/meals", "mlns/meals_any_for.mln", "dbs/query2.db"), ("auto",)),
+    "smoking": (_file("pracmln/smokers", "mlns/wts.pybpll.smoking-train-smoking.mln", "dbs/smoking-test.db"), METHODS),
     "smokers-20000": (lambda: generators.smokers(10_000), ("auto", "mincut", "annealing")),
     "smokers-200000": (lambda: generators.smokers(100_000), ("auto", "mincut")),
     "smokers-2000000": (lambda: generators.smokers(1_000_000), ("auto",)),
