@@ -1,5 +1,7 @@
 """Samplers against exact answers: their errors are as large as they say, and their kernels do what is written."""
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +11,9 @@ from mlnlite.ground.patterns import with_counts
 from mlnlite.infer.factors import factors_of
 from mlnlite.infer.gibbs import gibbs_draws, log_weights, owners, start, states
 from mlnlite.infer.marginal import marginals_of
-from mlnlite.infer.mcsat import jump
+from mlnlite.infer.mcsat import jump, mcsat_draws
 from mlnlite.infer.sampling import Effort, sample
+from mlnlite.infer.worlds import start_worlds
 from tests.networks import network, networks, world_weight, worlds
 
 NOTHING = np.zeros((0, 2), np.int32)
@@ -225,3 +228,41 @@ def test_same_seed_same_answer():
     n = min(first.draws.shape[1], second.draws.shape[1], 20)
     assert n >= 8
     assert first.probability == pytest.approx(second.probability, abs=0.1)
+
+
+@pytest.mark.parametrize("sampler", [gibbs_draws, lambda chain, n, watched: mcsat_draws(chain, n, watched, EVEN)])
+def test_compiled_code_does_what_is_written(monkeypatch, sampler):
+    """All kernels as plain Python, those that they call too: the same worlds from the same chance."""
+    net = with_counts(pulled_groups())
+    factors = factors_of(net, np.ones(net.n_variables, bool))
+    truth = start_worlds(net, 1, np.random.default_rng(1))[0][factors.atom]
+    fast, slow = (start(factors, truth, np.random.default_rng(5)) for _ in range(2))
+    compiled = sampler(fast, 15, NOTHING)
+    plain = {name: getattr(import_module(f"mlnlite.infer.{home}"), name) for home, name in KERNELS}
+    for module in {f"mlnlite.infer.{home}" for home, _ in KERNELS}:
+        for name, kernel in plain.items():
+            if hasattr(import_module(module), name):
+                monkeypatch.setattr(import_module(module), name, kernel.py_func)
+    written = sampler(slow, 15, NOTHING)
+    assert np.array_equal(fast.true, slow.true)
+    assert np.array_equal(fast.state, slow.state)
+    np.testing.assert_allclose(compiled.total, written.total, atol=1e-12)
+
+
+EVEN = np.ones(1000, bool)
+KERNELS = [
+    ("gibbs_kernel", "sweep"), ("swap_kernel", "swap"), ("mcsat_slice", "cut"), ("mcsat_units", "propagate"),
+    ("mcsat_fix", "fix"), ("mcsat_assign", "assign"), ("mcsat_list", "list_worlds"), ("mcsat_reach", "reach"),
+    ("mcsat_draw", "draw"), ("mcsat_walk", "walk"),
+]  # fmt: skip
+
+
+def pulled_groups():
+    """Blocks, groups of which at most one is true, hard clauses, and too many worlds of one part to list them all."""
+    rng = np.random.default_rng(2)
+    n = 40
+    pairs = [([-a, -b], 0, 1) for first in (1, 6) for a in range(first, first + 5) for b in range(first, a)]
+    hard = [(sorted(int(x) for x in rng.choice(np.arange(11, n + 1), 3, replace=False)), 1, 1) for _ in range(40)]
+    same = [([-(n + 1 + k), n + 4 + k], 2, 1) for k in range(3)]
+    blocks = [("", 1)] * n + [("!", 3), ("?", 3)]
+    return network(blocks, [(pairs + same, False), (hard, False)], weights=[3.0, np.inf, 1.2])
