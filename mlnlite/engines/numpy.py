@@ -310,7 +310,8 @@ def _union(sources: list[_Rows], columns: tuple[str, ...]) -> _Rows:
         present[key] = True
         key = np.flatnonzero(present)
     else:
-        key = np.unique(key)
+        key = np.sort(key)  # np.unique, which hashes, is slower on long arrays
+        key = key[np.append(True, key[1:] != key[:-1])] if len(key) else key
     return _Rows(dict(zip(columns, keys.columns(key), strict=True)), len(key))
 
 

@@ -6,7 +6,7 @@ without such a formula, ask which of its groundings the solution violates, add t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,27 +29,6 @@ from mlnlite.model.propositional import cubes
 Int64 = NDArray[np.int64]
 
 _CERTAIN = ".certain"
-
-
-def without_templates(network: Network, templates: Iterable[int]) -> Network:
-    """The network without the factors of some templates (indices in `model.templates`)."""
-    left_out = np.isin(network.template, list(templates))
-    clauses = tuple(
-        replace(c, literals=c.literals[k], weight=c.weight[k], count=c.count[k])
-        for c in network.clauses
-        for k in [~left_out[c.weight]]
-    )
-    tables = tuple(
-        replace(t, atoms=t.atoms[k], weight=t.weight[k], count=t.count[k])
-        for t in network.tables
-        for k in [~left_out[t.weight]]
-    )
-    counts = tuple(
-        replace(t, literals=t.literals[k], weight=t.weight[k], count=t.count[k])
-        for t in network.counts
-        for k in [~left_out[t.weight]]
-    )
-    return replace(network, clauses=clauses, tables=tables, counts=counts)
 
 
 def world_evidence(network: Network, truth: NDArray[np.bool_]) -> Evidence:
