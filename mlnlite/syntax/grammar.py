@@ -6,8 +6,10 @@ as all else that a short command does.
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mlnlite.errors import SyntaxMistake
@@ -48,7 +50,18 @@ def _parser(language: Language) -> Lark:
         parser="lalr",
         propagate_positions=True,
         maybe_placeholders=False,
+        cache=_tables(language),
     )
+
+
+def _tables(language: Language) -> str | bool:
+    """The file that keeps the tables of a grammar for the next command, or False; the library checks that it fits."""
+    try:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mlnlite"
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # no home, or none to write to
+        return False
+    return str(folder / f"{language}.tables")
 
 
 def parse_node(rule: str, text: str, place: Place, language: Language) -> Any:  # noqa: ANN401
