@@ -96,6 +96,11 @@ class _Case:
     exhaustive: bool
     refused: Counter[str]
 
+    @property
+    def out_of_calls(self) -> bool:
+        """Whether the inverse kinematics may not be asked again."""
+        return self.refused["calls"] >= self.options.ik_calls
+
 
 _Best = tuple[float, float, int, int, Hold]
 
@@ -177,9 +182,9 @@ def _search(case: _Case, costs: CostField) -> tuple[_Best | None, float, bool]:
     for i, voxel in enumerate(order):
         if not case.exhaustive and best is not None and (bounds[voxel], risks[voxel]) > best[:2]:
             break
-        if case.refused["calls"] >= case.options.ik_calls:
-            return best, float(bounds[order[i:]].min()), True
         found = _safest(case, costs, int(voxel))
+        if found is None and case.out_of_calls:
+            return best, float(bounds[order[i:]].min()), True
         best = min((b for b in (best, found) if b is not None), key=lambda b: b[:3], default=None)
     return best, best[0] if best is not None else float("inf"), False
 
@@ -191,6 +196,8 @@ def _safest(case: _Case, costs: CostField, voxel: int) -> _Best | None:
     case.refused["collision"] += int((costs.allowed[voxel] & ~clear).sum())
     candidates = np.flatnonzero(costs.allowed[voxel] & clear)
     for k in candidates[np.argsort(-costs.safety[voxel, candidates], kind="stable")]:
+        if case.out_of_calls:
+            return None
         pose = Pose(costs.centres[voxel], costs.rotations[voxel, k])
         outcome = attempt(case.scene, case.grasps, costs.grasp, pose, case.options)
         case.refused["calls"] += outcome.calls
