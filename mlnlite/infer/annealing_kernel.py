@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.infer.compiled import compiled
+from mlnlite.infer.moves_kernel import gain_of, shift
 
 
 @compiled
@@ -34,19 +35,10 @@ def sweeps(start, begin, cell, amount, missing, world, best, temperatures, value
             old = world[v]
             new = int(rng.random() * (size - 1))
             new += new >= old
-            gain = 0.0
-            for i in range(begin[start[v] + new], begin[start[v] + new + 1]):
-                if missing[cell[i]] == 1:
-                    gain += amount[cell[i]]
-            for i in range(begin[start[v] + old], begin[start[v] + old + 1]):
-                if missing[cell[i]] == 0:
-                    gain -= amount[cell[i]]
+            gain = gain_of(begin, cell, amount, missing, start[v] + old, start[v] + new)
             if gain < 0 and rng.random() >= np.exp(gain / temperature):
                 continue
-            for i in range(begin[start[v] + new], begin[start[v] + new + 1]):
-                missing[cell[i]] -= 1
-            for i in range(begin[start[v] + old], begin[start[v] + old + 1]):
-                missing[cell[i]] += 1
+            shift(begin, cell, missing, start[v] + old, start[v] + new)
             world[v] = new
             value += gain
         if value > top:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.infer.compiled import compiled
+from mlnlite.infer.moves_kernel import enlist, gain_of, shift
 
 
 @compiled
-def walk(start, begin, cell, first, literal, amount, owner, missing, world, best, unpaid, place, last, n_unpaid, steps, noise, tabu, now, value, top, rng):  # type: ignore[no-untyped-def]  # fmt: skip  # noqa: ANN001, ANN201, C901, E501, PLR0913
+def walk(start, begin, cell, first, literal, amount, owner, missing, world, best, unpaid, place, last, n_unpaid, steps, noise, tabu, now, value, top, rng):  # type: ignore[no-untyped-def]  # fmt: skip  # noqa: ANN001, ANN201, E501, PLR0913
     """Steps: take a cell that costs, at random, and change one of its variables so that it does not.
 
     A cell costs if it holds and its amount is negative, or fails to hold and its amount is positive.
@@ -58,38 +59,16 @@ def walk(start, begin, cell, first, literal, amount, owner, missing, world, best
             for new in range(size):
                 if new == world[v] or (amount[c] > 0 and new != own):
                     continue
-                gain = 0.0
-                for i in range(begin[start[v] + new], begin[start[v] + new + 1]):
-                    if missing[cell[i]] == 1:
-                        gain += amount[cell[i]]
-                for i in range(begin[start[v] + world[v]], begin[start[v] + world[v] + 1]):
-                    if missing[cell[i]] == 0:
-                        gain -= amount[cell[i]]
+                gain = gain_of(begin, cell, amount, missing, start[v] + world[v], start[v] + new)
                 rests = step - last[v] <= tabu and value + gain <= top
                 if gain > move_gain and not rests:
                     move_v, move_new, move_gain = v, new, gain
         if move_v < 0:
             continue
-        for side in range(2):
-            value_at = start[move_v] + (move_new if side == 0 else world[move_v])
-            for i in range(begin[value_at], begin[value_at + 1]):
-                d = cell[i]
-                missing[d] += -1 if side == 0 else 1
-        for side in range(2):
-            value_at = start[move_v] + (move_new if side == 0 else world[move_v])
-            for i in range(begin[value_at], begin[value_at + 1]):
-                d = cell[i]
-                costs = (missing[d] == 0) == (amount[d] < 0)
-                if costs and place[d] < 0:
-                    place[d] = n_unpaid
-                    unpaid[n_unpaid] = d
-                    n_unpaid += 1
-                elif not costs and place[d] >= 0:
-                    n_unpaid -= 1
-                    moved = unpaid[n_unpaid]
-                    unpaid[place[d]] = moved
-                    place[moved] = place[d]
-                    place[d] = -1
+        gone, come = start[move_v] + world[move_v], start[move_v] + move_new
+        shift(begin, cell, missing, gone, come)
+        for changed in (come, gone):
+            n_unpaid = enlist(begin, cell, amount, missing, unpaid, place, n_unpaid, changed)
         world[move_v], last[move_v] = move_new, step
         value += move_gain
         if value > top + 1e-9:
