@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mlnlite.infer.compiled import compiled
+from mlnlite.compiled import compiled
 from mlnlite.infer.moves_kernel import gain_of, shift
 
 

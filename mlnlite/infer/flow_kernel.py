@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mlnlite.infer.compiled import compiled
+from mlnlite.compiled import compiled
 
 _FREE, _SOURCE, _SINK = 0, 1, 2
 _TOP, _ORPHAN, _NONE = -1, -2, -3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mlnlite.infer.compiled import compiled
+from mlnlite.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_slice import Slice
 

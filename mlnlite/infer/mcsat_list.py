@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from mlnlite.compiled import compiled
 from mlnlite.ground.network import Int32
-from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_assign import assign
 from mlnlite.infer.mcsat_slice import Slice

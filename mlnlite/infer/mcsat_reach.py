@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from mlnlite.compiled import compiled
 from mlnlite.ground.network import Bool, Int32
-from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 from mlnlite.infer.mcsat_slice import Slice
 

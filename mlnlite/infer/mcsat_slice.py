@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mlnlite.compiled import compiled
 from mlnlite.ground.network import Bool, Float, Int32, Int64
-from mlnlite.infer.compiled import compiled
 from mlnlite.infer.factors import Factors
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mlnlite.infer.compiled import compiled
+from mlnlite.compiled import compiled
 
 
 @compiled
