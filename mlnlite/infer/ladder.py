@@ -114,13 +114,15 @@ def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple
             raise LimitReached("the time limit was reached", hint="give it more time, or ask for `auto`")
         return network, found
     found = marginals_of(network, asked, width_limit=limit, too_wide="leave")
-    if found.wide:
-        from mlnlite.ground.patterns import with_counts
+    if not found.wide:
+        return network, found
+    from mlnlite.ground.patterns import with_counts
 
-        refuses = approach.method == "exact"
-        network, rung = with_counts(network), _rung_for_wide(network, approach)
-        found = marginals_of(network, asked, width_limit=limit, too_wide="raise" if refuses else "leave", rung=rung)
-    return network, found
+    counted, rung = with_counts(network), _rung_for_wide(network, approach)
+    refuses = approach.method == "exact"
+    if refuses or rung is not None or len(counted.counts) > len(network.counts):
+        found = marginals_of(counted, asked, width_limit=limit, too_wide="raise" if refuses else "leave", rung=rung)
+    return counted, found
 
 
 def _rung_by_name(approach: Approach) -> Rung | None:

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
+from mlnlite.ground.network import Bool, Float, Float32, Int32, Int64, Network
 from mlnlite.infer.approach import Sampler
 from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.diagnostics import r_hat, standard_errors
@@ -28,7 +28,7 @@ Ending = Literal["precise", "time", "interrupted"]
 LEAST_SIZE = 400.0
 MOST_R_HAT = 1.01
 _FIRST_LOOK, _LATER = 256, 1.5
-_AT_ONCE, _FEWEST = 0.2, 8
+_AT_ONCE, _FEWEST, _WORST = 0.2, 8, 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,8 +185,17 @@ def look(run: Run, precision: float = np.inf) -> Look:
     if (error <= precision).all() and (precision == np.inf or (size[moved] >= LEAST_SIZE).all()):
         changes = moved & (variance > 0)
         agree = np.where(moved, 1.0, np.nan)
-        agree[changes] = r_hat(series[:, :, changes], ratio[changes])
+        agree[changes] = _agreement(series[:, :, changes], ratio[changes], size[changes], precision)
     return Look(mean, error, agree, size, moved)
+
+
+def _agreement(series: Float32, ratio: Float, size: Float, precision: float) -> Float:
+    """R-hat of each column; with a finite `precision` nan if it is bad where it is likeliest to: at small sizes."""
+    if precision < np.inf:
+        worst = np.argsort(size)[:_WORST]
+        if (r_hat(series[:, :, worst], ratio[worst]) > MOST_R_HAT).any():
+            return np.full(len(size), np.nan)
+    return r_hat(series, ratio)
 
 
 def until_precise(run: Run, precision: float, deadline: Deadline) -> tuple[Look, Ending]:
