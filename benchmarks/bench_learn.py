@@ -12,7 +12,7 @@ import pytest
 import mlnlite as ml
 from mlnlite.infer.deadline import Deadline
 from mlnlite.learn.learned import How
-from mlnlite.learn.objectives import Search, solved, task_of
+from mlnlite.learn.objectives.choose import Search, solved, task_of
 from mlnlite.learn.prior import Gaussian
 from mlnlite.model.evidence import Facts
 from mlnlite.model.symbols import Type

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.bench_infer import citations, smokers
 from mlnlite.infer.approach import Approach
-from mlnlite.infer.ladder import solve
+from mlnlite.infer.marginal.ladder import solve
 
 NETWORKS = {
     "smokers, 10,000 atoms": lambda: smokers(5000, 10_000),

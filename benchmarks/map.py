@@ -16,7 +16,7 @@ from pathlib import Path
 
 import mlnlite as ml
 from benchmarks import generators
-from mlnlite.infer.rungs import METHODS, Method
+from mlnlite.infer.map.rungs import METHODS, Method
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 LIMIT = 60.0

@@ -36,28 +36,28 @@ if TYPE_CHECKING:
     from mlnlite.infer.scored import score as score
     from mlnlite.infer.session import Session as Session
     from mlnlite.infer.session import compile as compile
-    from mlnlite.learn.advice import advice as advice
-    from mlnlite.learn.content import with_shared_constants as with_shared_constants
-    from mlnlite.learn.crossvalidate import CrossValidation as CrossValidation
-    from mlnlite.learn.crossvalidate import Split as Split
-    from mlnlite.learn.crossvalidate import Training as Training
-    from mlnlite.learn.crossvalidate import crossvalidate as crossvalidate
-    from mlnlite.learn.effects import effects as effects
-    from mlnlite.learn.effects import held_out as held_out
-    from mlnlite.learn.evaluate import Evaluation as Evaluation
-    from mlnlite.learn.evaluate import evaluate as evaluate
+    from mlnlite.learn.data.content import with_shared_constants as with_shared_constants
+    from mlnlite.learn.evaluation.crossvalidate import CrossValidation as CrossValidation
+    from mlnlite.learn.evaluation.crossvalidate import Split as Split
+    from mlnlite.learn.evaluation.crossvalidate import Training as Training
+    from mlnlite.learn.evaluation.crossvalidate import crossvalidate as crossvalidate
+    from mlnlite.learn.evaluation.evaluate import Evaluation as Evaluation
+    from mlnlite.learn.evaluation.evaluate import evaluate as evaluate
     from mlnlite.learn.learned import LearnedModel as LearnedModel
-    from mlnlite.learn.path import LaplacePath as LaplacePath
-    from mlnlite.learn.path import laplace_path as laplace_path
     from mlnlite.learn.prior import Cauchy as Cauchy
     from mlnlite.learn.prior import Gaussian as Gaussian
     from mlnlite.learn.prior import Hierarchical as Hierarchical
     from mlnlite.learn.prior import Laplace as Laplace
     from mlnlite.learn.prior import Prior as Prior
-    from mlnlite.learn.structure import Structure as Structure
-    from mlnlite.learn.structure import find_rules as find_rules
-    from mlnlite.learn.uncertainty import Uncertainty as Uncertainty
-    from mlnlite.learn.uncertainty import uncertainty as uncertainty
+    from mlnlite.learn.structure.find import Structure as Structure
+    from mlnlite.learn.structure.find import find_rules as find_rules
+    from mlnlite.learn.trust.advice import advice as advice
+    from mlnlite.learn.trust.effects import effects as effects
+    from mlnlite.learn.trust.effects import held_out as held_out
+    from mlnlite.learn.trust.path import LaplacePath as LaplacePath
+    from mlnlite.learn.trust.path import laplace_path as laplace_path
+    from mlnlite.learn.trust.uncertainty import Uncertainty as Uncertainty
+    from mlnlite.learn.trust.uncertainty import uncertainty as uncertainty
     from mlnlite.learn.weights import learn as learn
     from mlnlite.model.evidence import Evidence as Evidence
     from mlnlite.model.facts import closed as closed
@@ -86,27 +86,27 @@ _HOMES = {
     "score": "mlnlite.infer.scored",
     "Session": "mlnlite.infer.session",
     "compile": "mlnlite.infer.session",
-    "advice": "mlnlite.learn.advice",
-    "CrossValidation": "mlnlite.learn.crossvalidate",
-    "Split": "mlnlite.learn.crossvalidate",
-    "Training": "mlnlite.learn.crossvalidate",
-    "crossvalidate": "mlnlite.learn.crossvalidate",
-    "effects": "mlnlite.learn.effects",
-    "held_out": "mlnlite.learn.effects",
-    "with_shared_constants": "mlnlite.learn.content",
-    "LaplacePath": "mlnlite.learn.path",
-    "laplace_path": "mlnlite.learn.path",
+    "advice": "mlnlite.learn.trust.advice",
+    "CrossValidation": "mlnlite.learn.evaluation.crossvalidate",
+    "Split": "mlnlite.learn.evaluation.crossvalidate",
+    "Training": "mlnlite.learn.evaluation.crossvalidate",
+    "crossvalidate": "mlnlite.learn.evaluation.crossvalidate",
+    "effects": "mlnlite.learn.trust.effects",
+    "held_out": "mlnlite.learn.trust.effects",
+    "with_shared_constants": "mlnlite.learn.data.content",
+    "LaplacePath": "mlnlite.learn.trust.path",
+    "laplace_path": "mlnlite.learn.trust.path",
     "Cauchy": "mlnlite.learn.prior",
     "Gaussian": "mlnlite.learn.prior",
     "Hierarchical": "mlnlite.learn.prior",
     "Laplace": "mlnlite.learn.prior",
     "Prior": "mlnlite.learn.prior",
-    "Structure": "mlnlite.learn.structure",
-    "find_rules": "mlnlite.learn.structure",
-    "Uncertainty": "mlnlite.learn.uncertainty",
-    "uncertainty": "mlnlite.learn.uncertainty",
-    "Evaluation": "mlnlite.learn.evaluate",
-    "evaluate": "mlnlite.learn.evaluate",
+    "Structure": "mlnlite.learn.structure.find",
+    "find_rules": "mlnlite.learn.structure.find",
+    "Uncertainty": "mlnlite.learn.trust.uncertainty",
+    "uncertainty": "mlnlite.learn.trust.uncertainty",
+    "Evaluation": "mlnlite.learn.evaluation.evaluate",
+    "evaluate": "mlnlite.learn.evaluation.evaluate",
     "LearnedModel": "mlnlite.learn.learned",
     "learn": "mlnlite.learn.weights",
     "Evidence": "mlnlite.model.evidence",

@@ -13,7 +13,7 @@ from mlnlite.cli.options import dialect_option, format_option, names, output_opt
 from mlnlite.cli.terminal import working
 
 if TYPE_CHECKING:
-    from mlnlite.learn.folds import By
+    from mlnlite.learn.evaluation.folds import By
     from mlnlite.learn.learned import Objective
     from mlnlite.syntax.tree import Dialect
 

@@ -150,7 +150,7 @@ def _per_template(network: Network) -> list[dict[str, object]]:
 
 
 def _sizes(network: Network) -> dict[str, int]:
-    from mlnlite.infer.components import components_of
+    from mlnlite.infer.reduce.components import components_of
 
     return {
         "n_atoms": network.n_atoms,

@@ -17,7 +17,7 @@ from mlnlite.cli.terminal import working
 
 if TYPE_CHECKING:
     from mlnlite.learn.learned import LearnedModel, Objective
-    from mlnlite.learn.report import Report
+    from mlnlite.learn.trust.report import Report
     from mlnlite.model.evidence import Evidence
     from mlnlite.model.model import Model
     from mlnlite.syntax.tree import Dialect
@@ -147,7 +147,7 @@ def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report |
     unseen = None if held is None else ml.held_out(learned, ml.read_evidence(held, model=learned.model))
     if method is None:
         return learned, None, unseen
-    from mlnlite.learn.report import report
+    from mlnlite.learn.trust.report import report
 
     with working("measuring"):
         return learned, report(learned, databases, method=method, seed=options["seed"]), unseen

@@ -30,7 +30,7 @@ from mlnlite.errors import QueryMistake
 
 if TYPE_CHECKING:
     from mlnlite.infer.approach import MarginalMethod
-    from mlnlite.infer.rungs import Method as MapMethod
+    from mlnlite.infer.map.rungs import Method as MapMethod
     from mlnlite.model.evidence import Evidence
     from mlnlite.model.model import Model
     from mlnlite.results import MapState, Marginals
@@ -173,7 +173,7 @@ def query(**options: Unpack[_Options]) -> None:
 
 def _answer(model: Model, evidence: Evidence, items: list[str], options: _Options) -> Marginals | MapState:
     import mlnlite as ml
-    from mlnlite.infer.marginal import WIDTH_LIMIT
+    from mlnlite.infer.exact.marginal import WIDTH_LIMIT
 
     closed = closed_world(model, items, names(options["closed_world"]), names(options["open_world"]))
     if options["task"] == "map":

@@ -10,8 +10,8 @@ from mlnlite.engines.plan import Engine
 from mlnlite.errors import QueryMistake
 from mlnlite.ground.network import Network
 from mlnlite.infer.answer import ask, state_of
-from mlnlite.infer.kbest import World, best_worlds, diverse_worlds
-from mlnlite.infer.map import BestWorld
+from mlnlite.infer.map.kbest import World, best_worlds, diverse_worlds
+from mlnlite.infer.map.ladder import BestWorld
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.results import MapState

@@ -16,10 +16,10 @@ from mlnlite.ground.ground import ground
 from mlnlite.ground.groups import renamed
 from mlnlite.ground.network import Network
 from mlnlite.infer.approach import Approach, MarginalMethod
-from mlnlite.infer.ladder import solve
-from mlnlite.infer.liftable import lifted_marginals
-from mlnlite.infer.marginal import WIDTH_LIMIT
-from mlnlite.infer.marginals import EVIDENCE, marginals_from
+from mlnlite.infer.exact.liftable import lifted_marginals
+from mlnlite.infer.exact.marginal import WIDTH_LIMIT
+from mlnlite.infer.marginal.ladder import solve
+from mlnlite.infer.marginal.results import EVIDENCE, marginals_from
 from mlnlite.infer.query import Question, atom_numbers, question_of
 from mlnlite.infer.score import costs
 from mlnlite.model.evidence import Evidence
@@ -30,9 +30,9 @@ from mlnlite.model.propositional import Proposition, simplified
 from mlnlite.results import MapState, Marginals, Statistics, Violation
 
 if TYPE_CHECKING:
-    from mlnlite.infer.map import BestWorld
-    from mlnlite.infer.rungs import Method
-    from mlnlite.infer.waiting import Lazy
+    from mlnlite.infer.map.cuts.waiting import Lazy
+    from mlnlite.infer.map.ladder import BestWorld
+    from mlnlite.infer.map.rungs import Method
 
 Int64 = NDArray[np.int64]
 
@@ -176,14 +176,14 @@ def map_state_for(  # noqa: PLR0913
         hint = "ask for atoms or predicates; the probability of a formula is a question for `marginal`"
         raise QueryMistake(f"the most probable world has atoms, not formulas: {question.formulas[0].text}", hint)
     from mlnlite.infer.deadline import in_seconds
-    from mlnlite.infer.map import map_of
-    from mlnlite.infer.rungs import Options
+    from mlnlite.infer.map.ladder import map_of
+    from mlnlite.infer.map.rungs import Options
 
     start = perf_counter()
     if lazy is None:
         best = map_of(network, method=method, time_limit=time_limit, seed=seed, gap=gap)
     else:
-        from mlnlite.infer.cuttingplanes import map_lazily
+        from mlnlite.infer.map.cuts.cuttingplanes import map_lazily
 
         lazy, best = map_lazily(lazy, Options(method, in_seconds(time_limit), seed, gap))
         network = lazy.network
@@ -228,7 +228,7 @@ def state_of(network: Network, question: Question, best: BestWorld, seconds: Map
 
 def _margins(network: Network, truth: NDArray[np.bool_], index: Int64, time_limit: float | None) -> NDArray[np.float64]:
     """What each row would lose if it were the other way round: infinity for known atoms."""
-    from mlnlite.infer.maxmarginals import margins_of
+    from mlnlite.infer.map.maxmarginals import margins_of
 
     found = margins_of(network, truth, np.unique(index[index >= 0]), time_limit=time_limit)
     margins = np.full(len(index), np.inf)
@@ -264,7 +264,7 @@ def ask(
     evidence = _closed(evidence, closed_world, frozenset() if question is None else question.predicates)
     atoms, lazy = None if question is None else question.all_atoms, None
     if waits:
-        from mlnlite.infer.waiting import without_lazy, worth_waiting
+        from mlnlite.infer.map.cuts.waiting import without_lazy, worth_waiting
 
         waiting = worth_waiting(model, evidence)
         lazy = without_lazy(model, evidence, waiting, atoms, engine) if waiting else None

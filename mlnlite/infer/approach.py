@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from mlnlite.infer.marginal import WIDTH_LIMIT
+from mlnlite.infer.exact.marginal import WIDTH_LIMIT
 
 Sampler = Literal["gibbs", "mcsat", "tempering"]
 MarginalMethod = Literal["auto", "exact", "lifted", "wmc", "gibbs", "mcsat", "tempering", "bp"]

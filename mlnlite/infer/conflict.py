@@ -9,8 +9,8 @@ import numpy as np
 
 from mlnlite.errors import Contradiction, Diagnostic
 from mlnlite.ground.network import Network
-from mlnlite.infer.counting import count_clauses
-from mlnlite.infer.potentials import decided_false
+from mlnlite.infer.reduce.counting import count_clauses
+from mlnlite.infer.reduce.potentials import decided_false
 from mlnlite.model.templates import Template
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.ground.network import Bool, Float, Int64, Network
-from mlnlite.infer.potentials import check_weights
+from mlnlite.infer.reduce.potentials import check_weights
 
 
 def counts(network: Network, truth: Bool) -> Int64:

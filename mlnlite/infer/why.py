@@ -19,9 +19,9 @@ from mlnlite.ground.ground import row_tables, source_of
 from mlnlite.ground.lazy import world_evidence
 from mlnlite.ground.network import Bool, Int64, Network
 from mlnlite.ground.tables import tables_of
-from mlnlite.infer.map import map_of
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.map.rungs import Method
 from mlnlite.infer.query import question_of
-from mlnlite.infer.rungs import Method
 from mlnlite.infer.score import counts, log_weight
 from mlnlite.model.propositional import cubes
 from mlnlite.model.unparse import row_text

@@ -10,8 +10,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from mlnlite.learn.optimise.problem import Problem
 from mlnlite.learn.prior import Penalty, Prior, prior_data, prior_text
-from mlnlite.learn.problem import Problem
 from mlnlite.model.model import Model
 
 Objective: TypeAlias = Literal["pseudo-likelihood", "likelihood", "composite", "max-margin"]

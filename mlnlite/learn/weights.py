@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from mlnlite.engines.plan import Engine
 from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
 from mlnlite.infer.deadline import in_seconds, interruptible
+from mlnlite.learn.data.missing import is_incomplete
 from mlnlite.learn.learned import How, LearnedModel, Objective
-from mlnlite.learn.missing import is_incomplete
-from mlnlite.learn.objectives import Search, solved, task_of
+from mlnlite.learn.objectives.choose import Search, solved, task_of
+from mlnlite.learn.optimise.problem import Problem, log_likelihood
+from mlnlite.learn.optimise.solve import BOUND, GRADIENT, Solution
 from mlnlite.learn.prior import PRIOR_SD, Prior, prior_of
-from mlnlite.learn.problem import Problem, log_likelihood
-from mlnlite.learn.solve import BOUND, GRADIENT, Solution
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Type

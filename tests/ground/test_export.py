@@ -18,9 +18,9 @@ from mlnlite.ground.export.text import text
 from mlnlite.ground.export.uai import uai
 from mlnlite.ground.export.wcnf import SCALE, wcnf
 from mlnlite.ground.export.write import export
-from mlnlite.infer.map import map_of
-from mlnlite.infer.marginal import marginals_of
-from mlnlite.infer.potentials import decided_log_weight
+from mlnlite.infer.exact.marginal import marginals_of
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.reduce.potentials import decided_log_weight
 from tests.models import evidence_texts, model_texts
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import mlnlite as ml
 from mlnlite.ground.isomorphism import copies
 from mlnlite.ground.network import Clauses, Counts, Tables
-from mlnlite.infer.components import labels_of
+from mlnlite.infer.reduce.components import labels_of
 from mlnlite.infer.score import log_weight
 from tests.networks import networks
 

@@ -4,7 +4,7 @@ import networkx as nx
 import numpy as np
 from hypothesis import given, settings
 
-from mlnlite.infer.components import components_of
+from mlnlite.infer.reduce.components import components_of
 from tests.networks import network, networks
 
 

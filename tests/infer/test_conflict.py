@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mlnlite.errors import Contradiction
-from mlnlite.infer.map import map_of
-from mlnlite.infer.marginal import marginals_of
+from mlnlite.infer.exact.marginal import marginals_of
+from mlnlite.infer.map.ladder import map_of
 from tests.networks import network
 
 HARD = np.inf

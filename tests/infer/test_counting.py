@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 import mlnlite as ml
 from mlnlite.errors import Contradiction, LimitReached
-from mlnlite.infer.counting import diagram
-from mlnlite.infer.formula import formula_probability
-from mlnlite.infer.map import map_of
-from mlnlite.infer.marginal import marginals_of
-from mlnlite.infer.sampling import Effort, sample
-from mlnlite.infer.worlds import can_differ, start_worlds
+from mlnlite.infer.exact.formula import formula_probability
+from mlnlite.infer.exact.marginal import marginals_of
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.reduce.counting import diagram
+from mlnlite.infer.sample.sampling import Effort, sample
+from mlnlite.infer.sample.worlds import can_differ, start_worlds
 from mlnlite.model.formulas import All, AtomRef
 from tests.networks import network, world_weight, worlds
 

@@ -6,16 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mlnlite as ml
-from mlnlite.infer import lazy_program
-from mlnlite.infer.cuttingplanes import map_lazily
-from mlnlite.infer.lazy_program import base_of
-from mlnlite.infer.map import map_of
-from mlnlite.infer.partition import partition, partitioned, transitive
-from mlnlite.infer.rows import Rows, add_clauses, add_stars, names_of, with_rows
-from mlnlite.infer.rungs import Options
-from mlnlite.infer.separation import lack, near_violations, stars
-from mlnlite.infer.star_kernel import grow
-from mlnlite.infer.waiting import violated_weight, without_lazy
+from mlnlite.infer.map.cuts import lazy_program
+from mlnlite.infer.map.cuts.cuttingplanes import map_lazily
+from mlnlite.infer.map.cuts.lazy_program import base_of
+from mlnlite.infer.map.cuts.partition import partition, partitioned, transitive
+from mlnlite.infer.map.cuts.rows import Rows, add_clauses, add_stars, names_of, with_rows
+from mlnlite.infer.map.cuts.separation import lack, near_violations, stars
+from mlnlite.infer.map.cuts.star_kernel import grow
+from mlnlite.infer.map.cuts.waiting import violated_weight, without_lazy
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.map.rungs import Options
 
 TEXTS = {
     "transitive": "Same(x, y) ^ Same(y, z) => Same(x, z)",

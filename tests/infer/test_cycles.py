@@ -9,14 +9,14 @@ import mlnlite as ml
 from benchmarks import generators
 from mlnlite.engines.numpy import NumpyEngine
 from mlnlite.ground.lazy import world_evidence
-from mlnlite.infer import cycles
-from mlnlite.infer.conjunctions import Cells
-from mlnlite.infer.cycles import pairs_of, violated_cycles
-from mlnlite.infer.dominance import merged
-from mlnlite.infer.map import map_of
-from mlnlite.infer.parts import Part, all_gains, value_of
-from mlnlite.infer.relaxation import bound_of, solve_program
-from mlnlite.infer.rows import Rows, with_rows
+from mlnlite.infer.map.cuts import cycles
+from mlnlite.infer.map.cuts.cycles import pairs_of, violated_cycles
+from mlnlite.infer.map.cuts.rows import Rows, with_rows
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.map.relaxation import bound_of, solve_program
+from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.dominance import merged
+from mlnlite.infer.reduce.parts import Part, all_gains, value_of
 from mlnlite.infer.score import costs
 
 

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlnlite.errors import LimitReached, MissingPart
-from mlnlite.infer.conjunctions import Cells
-from mlnlite.infer.elimination import best_world, log_sum
-from mlnlite.infer.map import map_of
-from mlnlite.infer.marginal import marginals_of
-from mlnlite.infer.order import TooWide, Tree, plan
+from mlnlite.infer.exact.elimination import best_world, log_sum
+from mlnlite.infer.exact.marginal import marginals_of
+from mlnlite.infer.exact.order import TooWide, Tree, plan
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.reduce.conjunctions import Cells
 from mlnlite.infer.score import log_weight
 from tests.networks import network
 
@@ -174,7 +174,7 @@ def test_a_sweep_solves_long_grids():
 
 
 def test_without_toulbar2_there_are_other_ways(monkeypatch):
-    monkeypatch.setattr("mlnlite.infer.toulbar2.is_available", lambda: False)
+    monkeypatch.setattr("mlnlite.infer.map.toulbar2.is_available", lambda: False)
     answer = map_of(dense())
     assert "wcsp" not in answer.methods
     assert answer.status == "optimal"

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlnlite.errors import Contradiction, LimitReached
-from mlnlite.infer.formula import formula_probabilities, formula_probability
+from mlnlite.infer.exact.formula import formula_probabilities, formula_probability
 from mlnlite.model.formulas import All, Any, AtomRef, Iff, Not
 from tests.networks import network, networks, world_weight, worlds
 

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 
 from mlnlite.errors import Contradiction
-from mlnlite.infer import map as map_module
-from mlnlite.infer import parts, peel
-from mlnlite.infer.map import map_of
+from mlnlite.infer.map import ladder as map_module
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.reduce import parts, peel
 from tests.networks import networks, world_weight, worlds
 
 

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 
 from mlnlite.errors import Contradiction
-from mlnlite.infer import kbest, maxmarginals
-from mlnlite.infer.kbest import best_worlds, diverse_worlds
-from mlnlite.infer.map import map_of
-from mlnlite.infer.maxmarginals import margins_of
-from mlnlite.infer.parts import divide
+from mlnlite.infer.map import kbest, maxmarginals
+from mlnlite.infer.map.kbest import best_worlds, diverse_worlds
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.map.maxmarginals import margins_of
+from mlnlite.infer.reduce.parts import divide
 from tests.networks import network, networks, world_weight, worlds
 
 

@@ -6,21 +6,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlnlite.errors import Contradiction
-from mlnlite.infer import annealing, ilp, maxsat, mincut, relaxation, toulbar2, walksat
-from mlnlite.infer.annealing_kernel import sweeps
-from mlnlite.infer.conjunctions import Cells
 from mlnlite.infer.deadline import Deadline
-from mlnlite.infer.dominance import merged, without_dominated
-from mlnlite.infer.elimination import best_world
-from mlnlite.infer.flow_kernel import push
-from mlnlite.infer.landscape import landscape_of, missing_of, worth
-from mlnlite.infer.map import map_of
-from mlnlite.infer.narrow import narrowed
-from mlnlite.infer.order import plan
-from mlnlite.infer.parts import Part, all_gains, value_of
-from mlnlite.infer.potentials import Potentials, potentials_of
-from mlnlite.infer.walksat_kernel import walk
-from mlnlite.infer.workers import workers
+from mlnlite.infer.exact.elimination import best_world
+from mlnlite.infer.exact.order import plan
+from mlnlite.infer.map import ilp, maxsat, mincut, relaxation, toulbar2
+from mlnlite.infer.map.flow_kernel import push
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.map.search import annealing, walksat
+from mlnlite.infer.map.search.annealing_kernel import sweeps
+from mlnlite.infer.map.search.landscape import landscape_of, missing_of, worth
+from mlnlite.infer.map.search.walksat_kernel import walk
+from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.dominance import merged, without_dominated
+from mlnlite.infer.reduce.narrow import narrowed
+from mlnlite.infer.reduce.parts import Part, all_gains, value_of
+from mlnlite.infer.reduce.potentials import Potentials, potentials_of
+from mlnlite.infer.workers.ask import workers
 from tests.networks import network, networks, world_weight, worlds
 
 
@@ -281,7 +282,7 @@ def test_kernels_do_what_their_python_does():
 def test_walks_do_what_their_python_does(monkeypatch):
     part = whole(one_hot(3, n=8))[1]
     compiled = walksat.solve_part(part, seed=2, steps=900)
-    monkeypatch.setattr("mlnlite.infer.walksat_kernel.walk", walk.py_func)
+    monkeypatch.setattr("mlnlite.infer.map.search.walksat_kernel.walk", walk.py_func)
     plain = walksat.solve_part(part, seed=2, steps=900)
     assert compiled.world.tolist() == plain.world.tolist()
 
@@ -290,7 +291,7 @@ def test_walks_do_what_their_python_does(monkeypatch):
 def test_flows_do_what_their_python_does(seed, monkeypatch):
     part = attractive(np.random.default_rng(seed), 40, 100)
     compiled = mincut.solve_part(part)
-    monkeypatch.setattr("mlnlite.infer.flow_kernel.push", push.py_func)
+    monkeypatch.setattr("mlnlite.infer.map.flow_kernel.push", push.py_func)
     plain = mincut.solve_part(part)
     assert compiled.world.tolist() == plain.world.tolist()
     assert plain.optimal

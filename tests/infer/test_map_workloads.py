@@ -9,11 +9,11 @@ import mlnlite as ml
 from benchmarks import generators
 from mlnlite.engines.numpy import NumpyEngine
 from mlnlite.ground.lazy import world_evidence
-from mlnlite.infer.cuttingplanes import map_lazily
-from mlnlite.infer.map import map_of
-from mlnlite.infer.rungs import Options
+from mlnlite.infer.map.cuts.cuttingplanes import map_lazily
+from mlnlite.infer.map.cuts.waiting import with_violated, without_lazy, worth_waiting
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.map.rungs import Options
 from mlnlite.infer.score import costs
-from mlnlite.infer.waiting import with_violated, without_lazy, worth_waiting
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "mln"
 

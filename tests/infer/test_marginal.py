@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 
 from mlnlite.errors import Contradiction
-from mlnlite.infer import conjunctions, marginal, parts, peel
-from mlnlite.infer.map import map_of
-from mlnlite.infer.marginal import marginals_of
+from mlnlite.infer.exact import marginal
+from mlnlite.infer.exact.marginal import marginals_of
+from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.reduce import conjunctions, parts, peel
 from tests.networks import networks, world_weight, worlds
 
 

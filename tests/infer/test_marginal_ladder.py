@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mlnlite as ml
-from mlnlite.infer import marginal
-from mlnlite.infer.parts import divide
+from mlnlite.infer.exact import marginal
+from mlnlite.infer.reduce.parts import divide
 
 TEXT = """Smokes(p)
 Friends(p, p)

@@ -8,12 +8,13 @@ from hypothesis import given, settings
 
 import mlnlite as ml
 from mlnlite.errors import Contradiction
-from mlnlite.infer import marginal, parts, wmc
-from mlnlite.infer.bp import LOOPY, propagate_beliefs
 from mlnlite.infer.deadline import Deadline, in_seconds
-from mlnlite.infer.marginal import marginals_of
-from mlnlite.infer.parts import divide
-from mlnlite.infer.potentials import potentials_of
+from mlnlite.infer.exact import marginal, wmc
+from mlnlite.infer.exact.marginal import marginals_of
+from mlnlite.infer.marginal.bp import LOOPY, propagate_beliefs
+from mlnlite.infer.reduce import parts
+from mlnlite.infer.reduce.parts import divide
+from mlnlite.infer.reduce.potentials import potentials_of
 from tests.networks import network, networks, world_weight, worlds
 
 counter = pytest.mark.skipif(not find_spec("pyganak"), reason="the extra wmc is not installed")
@@ -67,7 +68,7 @@ def latin(n):
 @counter
 def test_what_is_mostly_hard_and_wide_is_counted(monkeypatch):
     from mlnlite.infer.approach import Approach
-    from mlnlite.infer.ladder import solve
+    from mlnlite.infer.marginal.ladder import solve
 
     net = latin(3)
     monkeypatch.setattr(marginal, "divide", lambda p: divide(p, 1))

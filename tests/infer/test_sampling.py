@@ -8,12 +8,12 @@ from hypothesis import given, settings
 
 import mlnlite as ml
 from mlnlite.ground.patterns import with_counts
-from mlnlite.infer.factors import factors_of
-from mlnlite.infer.gibbs import gibbs_draws, log_weights, owners, start, states
-from mlnlite.infer.marginal import marginals_of
-from mlnlite.infer.mcsat import jump, mcsat_draws
-from mlnlite.infer.sampling import Effort, sample
-from mlnlite.infer.worlds import start_worlds
+from mlnlite.infer.exact.marginal import marginals_of
+from mlnlite.infer.sample.factors import factors_of
+from mlnlite.infer.sample.gibbs import gibbs_draws, log_weights, owners, start, states
+from mlnlite.infer.sample.mcsat.chain import jump, mcsat_draws
+from mlnlite.infer.sample.sampling import Effort, sample
+from mlnlite.infer.sample.worlds import start_worlds
 from tests.networks import network, networks, world_weight, worlds
 
 NOTHING = np.zeros((0, 2), np.int32)
@@ -238,8 +238,8 @@ def test_compiled_code_does_what_is_written(monkeypatch, sampler):
     truth = start_worlds(net, 1, np.random.default_rng(1))[0][factors.atom]
     fast, slow = (start(factors, truth, np.random.default_rng(5)) for _ in range(2))
     compiled = sampler(fast, 15, NOTHING)
-    plain = {name: getattr(import_module(f"mlnlite.infer.{home}"), name) for home, name in KERNELS}
-    for module in {f"mlnlite.infer.{home}" for home, _ in KERNELS}:
+    plain = {name: getattr(import_module(f"mlnlite.infer.sample.{home}"), name) for home, name in KERNELS}
+    for module in {f"mlnlite.infer.sample.{home}" for home, _ in KERNELS}:
         for name, kernel in plain.items():
             if hasattr(import_module(module), name):
                 monkeypatch.setattr(import_module(module), name, kernel.py_func)
@@ -251,9 +251,9 @@ def test_compiled_code_does_what_is_written(monkeypatch, sampler):
 
 EVEN = np.ones(1000, bool)
 KERNELS = [
-    ("gibbs_kernel", "sweep"), ("swap_kernel", "swap"), ("mcsat_slice", "cut"), ("mcsat_units", "propagate"),
-    ("mcsat_fix", "fix"), ("mcsat_assign", "assign"), ("mcsat_list", "list_worlds"), ("mcsat_reach", "reach"),
-    ("mcsat_draw", "draw"), ("mcsat_walk", "walk"),
+    ("gibbs_kernel", "sweep"), ("swap_kernel", "swap"), ("mcsat.slice", "cut"), ("mcsat.units", "propagate"),
+    ("mcsat.fix", "fix"), ("mcsat.assign", "assign"), ("mcsat.list", "list_worlds"), ("mcsat.reach", "reach"),
+    ("mcsat.draw", "draw"), ("mcsat.walk", "walk"),
 ]  # fmt: skip
 
 

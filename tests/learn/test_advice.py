@@ -7,9 +7,9 @@ import pytest
 from scipy import sparse
 
 import mlnlite as ml
-from mlnlite.learn.advice import advice, separable
-from mlnlite.learn.effects import effects, held_out
 from mlnlite.learn.prior import Cauchy, Gaussian, Hierarchical, Laplace
+from mlnlite.learn.trust.advice import advice, separable
+from mlnlite.learn.trust.effects import effects, held_out
 
 MODEL = "S(p)\nC(p)\nG(p, k!)\nk = {K1, K2, K3}\n"
 FACTS = "S(A)\nS(B)\nS(D)\nC(A)\nC(B)\nC(E)\nG(A, K1)\nG(B, K1)\nG(D, K1)\nG(E, K2)\nG(H, K2)\nG(I, K3)\n"
@@ -49,7 +49,7 @@ def test_laplace_gives_exact_zeros_all_along_its_path():
 
 def test_laplace_satisfies_the_conditions_of_the_optimum():
     """At the optimum the slope of the likelihood is 1/scale against each weight, and at most that where it is 0."""
-    from mlnlite.learn.problem import log_likelihood
+    from mlnlite.learn.optimise.problem import log_likelihood
 
     learned = learnt("S(x)\nS(x) ^ C(x)\nS(x) => G(x, +k)\nC(x)", prior=Laplace(0.8))
     x = learned.weights[learned.problem.free]

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 
 import mlnlite as ml
-from mlnlite.learn import exact
 from mlnlite.learn.learned import How
-from mlnlite.learn.objectives import task_of
-from mlnlite.learn.problem import log_likelihood
+from mlnlite.learn.objectives import exact
+from mlnlite.learn.objectives.choose import task_of
+from mlnlite.learn.optimise.problem import log_likelihood
 from tests import brute
 from tests.models import evidence_texts, model_texts
 

@@ -12,10 +12,10 @@ from sklearn import metrics as reference
 from sklearn.linear_model import LogisticRegression
 
 import mlnlite as ml
-from mlnlite.learn import metrics
-from mlnlite.learn.baselines import SPREAD, look_up, majority, naive_bayes, pairwise_logistic
-from mlnlite.learn.crossvalidate import MODEL, Split, Training, crossvalidate
-from mlnlite.learn.folds import folds, groups, select
+from mlnlite.learn.evaluation import metrics
+from mlnlite.learn.evaluation.baselines import SPREAD, look_up, majority, naive_bayes, pairwise_logistic
+from mlnlite.learn.evaluation.crossvalidate import MODEL, Split, Training, crossvalidate
+from mlnlite.learn.evaluation.folds import folds, groups, select
 from tests.learn.data import folder
 
 

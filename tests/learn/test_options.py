@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 import mlnlite as ml
 from mlnlite.cli import mlnlite as command
-from mlnlite.learn.problem import log_likelihood
+from mlnlite.learn.optimise.problem import log_likelihood
 
 TEXT = "S(p)\nC(p)\nG(p, k!)\nk = {K1, K2}\nS(x) => C(x)\nC(x)\nS(x)\nS(x) ^ G(x, +k)\nC(x) ^ G(x, +k)\n"
 FIRST = "S(A)\nS(B)\nC(A)\nC(D)\nG(A, K1)\nG(B, K2)\nG(D, K1)"
@@ -55,7 +55,7 @@ def test_tied_weights_are_equal_and_best(objective):
 
 
 def test_tied_weights_with_wide_components(monkeypatch):
-    from mlnlite.learn import exact
+    from mlnlite.learn.objectives import exact
 
     model, data = read(FIRST)
     options = {"objective": "likelihood", "tied": [["formula 2", "formula 3"]], "predict": ["S", "C"], "prior": 2.0}

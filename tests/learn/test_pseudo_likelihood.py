@@ -12,9 +12,9 @@ from hypothesis import given, settings
 import mlnlite as ml
 from mlnlite.engines.duckdb import DuckDBEngine
 from mlnlite.engines.numpy import NumpyEngine
-from mlnlite.learn import likelihood
-from mlnlite.learn.merge import merged
-from mlnlite.learn.objectives import pseudo_listed
+from mlnlite.learn.data.merge import merged
+from mlnlite.learn.objectives.choose import pseudo_listed
+from mlnlite.learn.optimise import likelihood
 from tests import brute
 from tests.models import evidence_texts, model_texts
 

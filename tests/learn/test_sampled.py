@@ -7,7 +7,8 @@ import pytest
 
 import mlnlite as ml
 from mlnlite.errors import LimitReached
-from mlnlite.learn import exact, problem, sampled
+from mlnlite.learn.objectives import exact, sampled
+from mlnlite.learn.optimise import problem
 
 MODEL = """S(p)
 C(p)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mlnlite as ml
-from mlnlite.learn.candidates import candidates, rule_text
-from mlnlite.learn.structure import find_rules
+from mlnlite.learn.structure.candidates import candidates, rule_text
+from mlnlite.learn.structure.find import find_rules
 
 VOCABULARY = "Ill(p)\nSmokes(p)\nSporty(p)\nCoffee(p)\nRich(p)\nFriends(p, p)\n"
 PLANTED = {"Smokes(x) => Ill(x)", "Sporty(x) => Ill(x)", "Friends(x, y) ^ Rich(y) => Ill(x)"}

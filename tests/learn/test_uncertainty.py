@@ -9,10 +9,10 @@ import pytest
 
 import mlnlite as ml
 from mlnlite.ground.ground import ground
-from mlnlite.learn import exact as exact_likelihood
-from mlnlite.learn import simulate
-from mlnlite.learn.simulate import draw_worlds, with_facts
-from mlnlite.learn.uncertainty import uncertainty
+from mlnlite.learn.objectives import exact as exact_likelihood
+from mlnlite.learn.trust import simulate
+from mlnlite.learn.trust.simulate import draw_worlds, with_facts
+from mlnlite.learn.trust.uncertainty import uncertainty
 from mlnlite.model.evidence import Facts
 
 COINS = "S(p)\nS(x)\n"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mlnlite as ml
-from mlnlite.learn import exact
-from mlnlite.learn.problem import log_likelihood
+from mlnlite.learn.objectives import exact
+from mlnlite.learn.optimise.problem import log_likelihood
 from mlnlite.model.evidence import Facts
 from tests import brute
 from tests.learn.test_exact_likelihood import log_sum, problem_of, with_weights

@@ -1,0 +1,1 @@
+"""Exact answers: elimination on clique trees, lifted inference, model counting."""

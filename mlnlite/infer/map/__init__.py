@@ -1,0 +1,1 @@
+"""The most probable world: which rung answers what, and the exact rungs."""

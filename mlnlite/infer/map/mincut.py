@@ -1,0 +1,185 @@
+"""Best worlds by minimum cuts: comes in a component of pairs that attract, goes out a world with a flow that proves it.
+
+A component whose cells have at most two literals, over atoms only, is a quadratic function of 0/1 variables. If some
+of them can be flipped so that every product then has a positive sign, the best world is a minimum cut (Hammer 1965;
+Greig, Porteous and Seheult 1989; Kolmogorov and Zabih, What energy functions can be minimized via graph cuts?, 2004).
+Amounts become integers, `amount * scale` rounded; sums are exact, and the bound says what the rounding may have lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from mlnlite.ground.network import Bool, Float, Int64
+from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.parts import Part, PartAnswer, value_of
+
+MINCUT = "mincut"
+_DIGITS = 12
+_SAMPLE = 1000
+_LARGEST = 2.0**60
+
+
+@dataclass(frozen=True, slots=True)
+class Quadratic:
+    """`(linear . x + sum product x[first] x[second]) / (2 scale)`, up to a constant, over variables 0 and 1.
+
+    Attributes:
+        linear: shape (n,).
+        first: shape (m,), smaller than `second`, each pair once.
+        second: shape (m,).
+        product: shape (m,), even.
+        scale: integers stand for that many times the amounts.
+        error: what rounding may have changed the difference of two worlds by.
+    """
+
+    linear: Int64
+    first: Int64
+    second: Int64
+    product: Int64
+    scale: float
+    error: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A proof: no cut is smaller than a flow, and this one is as large.
+
+    Attributes:
+        source_side: shape (n,), which nodes the source still reaches.
+        capacity: of the arcs that lead from those nodes to the others.
+        flow: value of the flow.
+    """
+
+    source_side: Bool
+    capacity: int
+    flow: int
+
+
+def quadratic(part: Part) -> Quadratic | None:
+    """A component as a quadratic function; None if it has cells of three literals, blocks or forbidden pairs."""
+    if any(c.scope.shape[1] > 2 for c in part.cells) or (part.cardinality != 2).any():
+        return None
+    n, amounts = len(part.variables), np.concatenate([np.zeros(0), *(c.amount for c in part.cells)])
+    if not np.isfinite(amounts).all():
+        return None
+    scale = _scale(amounts)
+    linear = np.zeros(n, np.int64)
+    pairs = Cells(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32), np.zeros(0))
+    for c in part.cells:
+        whole = 2 * np.rint(c.amount * scale).astype(np.int64)
+        if c.scope.shape[1] == 1:
+            np.add.at(linear, c.scope[:, 0], np.where(c.value[:, 0] == 1, whole, -whole))
+        else:
+            pairs = c
+            for own, other in ((0, 1), (1, 0)):
+                alone = np.where(c.value[:, other] == 0, whole, 0)
+                np.add.at(linear, c.scope[:, own], np.where(c.value[:, own] == 1, alone, -alone))
+    whole = 2 * np.rint(pairs.amount * scale).astype(np.int64)
+    signed = np.where(pairs.value[:, 0] == pairs.value[:, 1], whole, -whole)
+    first, second, product = _summed(pairs.scope, signed, n)
+    error = float(np.abs(np.rint(amounts * scale) / scale - amounts).sum())
+    return Quadratic(linear, first, second, product, scale, error)
+
+
+def _scale(amounts: Float) -> float:
+    """The smallest power of ten that makes all amounts integers, or the largest one that is safe."""
+    room = int(np.floor(np.log10(_LARGEST / max(1.0, 4 * float(np.abs(amounts).sum())))))
+    for digits in range(min(room, _DIGITS)):
+        if _are_integers(amounts[:_SAMPLE], digits) and _are_integers(amounts, digits):
+            return 10.0**digits
+    return float(10.0 ** min(room, _DIGITS))
+
+
+def _are_integers(amounts: Float, digits: int) -> bool:
+    """Whether amounts have at most so many decimals."""
+    shifted = amounts * 10.0**digits
+    return bool((np.abs(shifted - np.rint(shifted)) <= 1e-9).all())
+
+
+def _summed(scope: np.ndarray, product: Int64, n: int) -> tuple[Int64, Int64, Int64]:
+    """Each pair once, with the sum of its products; pairs that cancel left out."""
+    key = scope[:, 0].astype(np.int64) * n + scope[:, 1]
+    if (np.diff(key) <= 0).any():
+        order = np.argsort(key, kind="stable")
+        key, product = key[order], product[order]
+        starts = np.flatnonzero(np.diff(key, prepend=-1))
+        key, product = key[starts], np.add.reduceat(product, starts)
+    keep = product != 0
+    first, second = np.divmod(key[keep], n)
+    return first, second, product[keep]
+
+
+def flips(function: Quadratic) -> Bool | None:
+    """Which variables to flip so that every product is positive; None if there is no such choice.
+
+    A pair with a negative product has to be flipped on one side, any other one on both or none: a 2-colouring.
+    """
+    n = len(function.linear)
+    repels = function.product < 0
+    if not repels.any():
+        return np.zeros(n, np.bool_)
+    a, b = function.first, function.second
+    start, end = np.concatenate([a, a + n]), np.concatenate([np.where(repels, b + n, b), np.where(repels, b, b + n)])
+    graph = coo_matrix((np.ones(len(start), np.int8), (start, end)), shape=(2 * n, 2 * n))
+    _, label = connected_components(graph, directed=False)
+    if (label[:n] == label[n:]).any():
+        return None
+    return np.asarray(label[:n] > label[n:])
+
+
+def flipped(function: Quadratic, flip: Bool) -> Quadratic:
+    """The function of the variables of which some are flipped (up to a constant)."""
+    a, b, sign = function.first, function.second, np.where(flip, -1, 1)
+    linear = function.linear * sign
+    # x = 1 - y: q x_a x_b = q x_a - q x_a y_b, so a flipped end gives its partner the product as a linear term
+    np.add.at(linear, a, np.where(flip[b], function.product, 0) * sign[a])
+    np.add.at(linear, b, np.where(flip[a], function.product, 0) * sign[b])
+    return Quadratic(linear, a, b, function.product * sign[a] * sign[b], function.scale, function.error)
+
+
+def solve_part(part: Part) -> PartAnswer | None:
+    """Solves a component, or says by None that it is of another kind.
+
+    Args:
+        part: the component.
+    """
+    function = quadratic(part)
+    flip = None if function is None else flips(function)
+    if function is None or flip is None:
+        return None
+    cut = minimum_cut(flipped(function, flip))
+    world = (cut.source_side != flip).astype(np.int64)
+    value = value_of(part, world)
+    return PartAnswer(world, value + function.error, cut.flow == cut.capacity, MINCUT)
+
+
+def minimum_cut(function: Quadratic) -> Cut:
+    """The world that makes a function with positive products largest: those on the source's side are 1.
+
+    `q x_a x_b = q (x_a + x_b) / 2 - q (x_a (1 - x_b) + x_b (1 - x_a)) / 2`: an arc of capacity q / 2 each way.
+    """
+    from mlnlite.infer.map.flow_kernel import push
+
+    n, half = len(function.linear), function.product // 2
+    terminal = function.linear.copy()
+    np.add.at(terminal, function.first, half)
+    np.add.at(terminal, function.second, half)
+    start = np.concatenate([function.first, function.second])
+    order = np.argsort(start, kind="stable")
+    head = np.concatenate([function.second, function.first])[order].astype(np.int32)
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    m = len(half)
+    sister = np.concatenate([place[m:], place[:m]])[order].astype(np.int32)
+    room = np.concatenate([half, half])[order]
+    begin = np.searchsorted(start[order], np.arange(n + 1)).astype(np.int32)
+    flow, side = push(begin, head, sister, room.copy(), terminal.copy())
+    leaves = side[function.first] != side[function.second]
+    capacity = int(half[leaves].sum()) + int(terminal[(terminal > 0) & ~side].sum())
+    capacity += int(-terminal[(terminal < 0) & side].sum())
+    return Cut(side, capacity, int(flow))

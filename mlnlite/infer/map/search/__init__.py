@@ -1,0 +1,1 @@
+"""Good worlds by local search, without a proof."""

@@ -1,0 +1,78 @@
+"""Good worlds by simulated annealing: comes in a component, goes out the best world seen (no proof).
+
+A move gives one variable, a block as a whole, another value. The temperature falls geometrically, again and again.
+Kirkpatrick, Gelatt and Vecchi, Optimization by simulated annealing (Science 1983).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mlnlite.ground.network import Float, Int64
+from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.map.search.landscape import Landscape, landscape_of, missing_of, worth
+from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains
+
+ANNEALING = "annealing"
+_COLDEST = 0.05
+_CHUNK = 2_000_000
+_MOVES, _PER_VARIABLE = 2e7, 20_000
+FOREVER = Deadline()
+
+
+def solve_part(
+    part: Part,
+    deadline: Deadline = FOREVER,
+    seed: int = 0,
+    *,
+    moves: float | None = None,
+    restarts: int = 4,
+    start: Int64 | None = None,
+) -> PartAnswer:
+    """Searches a component.
+
+    Args:
+        part: the component.
+        deadline: when to stop.
+        seed: of chance.
+        moves: how many moves to try in all, by default 20,000 for each variable, but at most 2e7.
+        restarts: how often the temperature falls.
+        start: shape (n,), a world to start from.
+    """
+    rng, landscape = np.random.default_rng(seed), landscape_of(part)
+    n = len(part.variables)
+    world = np.zeros(n, np.int64) if start is None else start.copy()
+    best, top = world.copy(), worth(landscape, world)
+    sweeps = max(10, int((moves or min(_MOVES, _PER_VARIABLE * n)) / restarts / n))
+    for _ in range(restarts):
+        best, top = _fall(landscape, best, top, temperatures(landscape, sweeps), rng, deadline)
+        if deadline.is_over:
+            break
+    forbidden = bool((missing_of(landscape, best)[landscape.hard] == 0).any())
+    return PartAnswer(None if forbidden else best, all_gains(part), False, ANNEALING)
+
+
+def temperatures(landscape: Landscape, n_sweeps: int) -> Float:
+    """From where the typical move is free to where the smallest one is rare."""
+    sizes = np.abs(landscape.amount[~landscape.hard])
+    typical = float(sizes.mean()) if len(sizes) else 1.0
+    return np.asarray(np.geomspace(3 * typical, _COLDEST * typical, n_sweeps))
+
+
+def _fall(
+    landscape: Landscape, best: Int64, top: float, schedule: Float, rng: np.random.Generator, deadline: Deadline
+) -> tuple[Int64, float]:
+    """One fall of the temperature from the best world so far; returns the best world and its value."""
+    from mlnlite.infer.map.search.annealing_kernel import sweeps
+
+    world, best, value = best.copy(), best.copy(), top
+    missing = missing_of(landscape, world)
+    step = max(1, _CHUNK // len(world))
+    for at in range(0, len(schedule), step):
+        value, top = sweeps(
+            landscape.start, landscape.begin, landscape.cell, landscape.amount, missing, world, best,
+            schedule[at : at + step], value, top, rng,
+        )  # fmt: skip
+        if deadline.is_over:
+            break
+    return best, top

@@ -1,0 +1,1 @@
+"""Marginal questions: which rung answers what."""

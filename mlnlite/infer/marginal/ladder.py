@@ -1,0 +1,264 @@
+"""The ladder of marginal inference: comes in a network and a question, goes out a number for each atom and formula.
+
+Each component is answered by the cheapest way that is exact; what is too wide for that is sampled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mlnlite.errors import LimitReached, QueryMistake
+from mlnlite.ground.network import Bool, Float, Float32, Int64, Network
+from mlnlite.infer.approach import PATIENCE, SAMPLERS, Approach
+from mlnlite.infer.deadline import in_seconds
+from mlnlite.infer.exact.formula import formula_probabilities
+from mlnlite.infer.exact.marginal import ELIMINATION, AtomProbabilities, Rung, marginals_of
+from mlnlite.infer.exact.wmc import MODEL_COUNTING, count_models, is_available, is_mostly_hard, verify_available
+from mlnlite.infer.query import atom_numbers
+from mlnlite.infer.reduce.parts import Part, Summed
+from mlnlite.model.formulas import Expression
+
+_SHARE = 6
+
+
+@dataclass(slots=True)
+class Solution:
+    """Answers about atoms, then formulas; arrays of shape (n,), filled in step by step.
+
+    Attributes:
+        probability: nan where there is no answer yet.
+        error: standard error, 0 where exact.
+        low: lower end of a 95 % interval.
+        high: its upper end.
+        r_hat: nan where not sampled, or never seen to change.
+        size: effective sample size, nan likewise.
+        exact: whether exact to machine precision.
+        methods: how each was found.
+        log_z: log partition function, nan if not known.
+        n_components: of the network.
+        largest_table: number of entries.
+        endings: why each sampling stopped.
+        mixed: whether chains agree and the effective size is large.
+        traces: of sampling, see `Estimates`.
+        draws: of each sampling: rows, and series of shape (n_chains, n_batches, n_rows).
+    """
+
+    probability: Float
+    error: Float
+    low: Float
+    high: Float
+    r_hat: Float
+    size: Float
+    exact: Bool
+    methods: list[str]
+    log_z: float = float("nan")
+    n_components: int = 0
+    largest_table: int = 0
+    endings: list[str] = field(default_factory=list)
+    mixed: Bool = field(default_factory=lambda: np.zeros(0, np.bool_))
+    traces: dict[str, Float] = field(default_factory=dict)
+    draws: list[tuple[Int64, Float32]] = field(default_factory=list)
+
+
+def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approach: Approach) -> Solution:
+    """Answers a question.
+
+    Args:
+        network: what was ground.
+        atoms: shape (n_atoms,), indices into `network.atoms`.
+        formulas: expressions over such.
+        approach: how.
+
+    Raises:
+        Contradiction: no world satisfies the hard formulas.
+        LimitReached: an exact answer was asked for and is too wide.
+        QueryMistake: a weight is not known.
+    """
+    asked = np.union1d(atoms, np.array(sorted({n for f in formulas for n in atom_numbers(f)}), np.int64)).astype(
+        np.int64
+    )
+    solution = _nothing_yet(len(atoms) + len(formulas))
+    if formulas and approach.method == "bp":
+        raise QueryMistake("belief propagation answers atoms only", hint="ask for `auto`, or for the atoms")
+    if approach.method in SAMPLERS:
+        everything = np.ones(network.n_variables, np.bool_)
+        _enter_sample(network, solution, everything, (atoms, formulas, np.arange(len(solution.methods))), approach)
+        return solution
+    network, found = _exactly(network, None if len(asked) == network.n_atoms else asked, approach)
+    solution.log_z, solution.largest_table = found.log_z, found.largest_table
+    solution.n_components = found.n_components
+    methods = [found.method[a] for a in atoms.tolist()]
+    _enter(solution, np.arange(len(atoms)), found.probability[atoms], found.exact[atoms], methods)
+    _formulas_exactly(network, solution, found, (len(atoms), formulas), approach)
+    if len(found.wide) > 1:
+        atoms = _with_twins(network, found, atoms, np.isnan(solution.probability[: len(atoms)]))
+    jobs = sorted(_jobs(found, (atoms, formulas), np.flatnonzero(np.isnan(solution.probability))), key=_n_rows)
+    deadline = in_seconds(PATIENCE if approach.time_limit is None else approach.time_limit)
+    for i, (components, rows) in enumerate(jobs):
+        variables = np.zeros(network.n_variables, np.bool_)
+        variables[network.variable[np.isin(found.component, components)]] = True
+        limited = replace(approach, time_limit=deadline.left / (len(jobs) - i))
+        _enter_sample(network, solution, variables, (atoms, formulas, rows), limited)
+    return solution
+
+
+def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple[Network, AtomProbabilities]:
+    """Elimination; where that is too wide, once more with pairs that are complete as counts."""
+    by_name, limit = _rung_by_name(approach), approach.width_limit
+    if by_name is not None:
+        found = marginals_of(network, asked, width_limit=1, too_wide="leave", rung=by_name)
+        if found.wide:
+            raise LimitReached("the time limit was reached", hint="give it more time, or ask for `auto`")
+        return network, found
+    found = marginals_of(network, asked, width_limit=limit, too_wide="leave")
+    if not found.wide:
+        return network, found
+    from mlnlite.ground.patterns import with_counts
+
+    counted, rung = with_counts(network), _rung_for_wide(network, approach)
+    refuses = approach.method == "exact"
+    if refuses or rung is not None or len(counted.counts) > len(network.counts):
+        found = marginals_of(counted, asked, width_limit=limit, too_wide="raise" if refuses else "leave", rung=rung)
+    return counted, found
+
+
+def _rung_by_name(approach: Approach) -> Rung | None:
+    """What answers all components that are not listed, if a user named it.
+
+    Raises:
+        MissingPart: it is not installed.
+    """
+    if approach.method == "bp":
+        from mlnlite.infer.marginal.bp import propagate_beliefs
+
+        return propagate_beliefs
+    if approach.method != "wmc":
+        return None
+    verify_available()
+    deadline = in_seconds(approach.time_limit)
+    return lambda part, wanted: count_models(part, wanted, deadline)
+
+
+def _rung_for_wide(network: Network, approach: Approach) -> Rung | None:
+    """Model counting of components that are mostly hard, if that is installed; for a sixth of the time."""
+    limit = PATIENCE if approach.time_limit is None else approach.time_limit
+    deadline = in_seconds(limit / _SHARE)
+    if not is_available():
+        return None
+
+    def rung(part: Part, wanted: Bool) -> Summed | None:
+        try:
+            return count_models(part, wanted, deadline) if is_mostly_hard(part, network.n_variables) else None
+        except LimitReached:
+            return None
+
+    return rung
+
+
+def _with_twins(network: Network, found: AtomProbabilities, atoms: Int64, which: Bool) -> Int64:
+    """Some of the atoms replaced by those that correspond to them in the first of isomorphic components."""
+    from mlnlite.ground.isomorphism import copies
+
+    component = np.zeros(network.n_variables, np.int32)
+    component[network.variable] = found.component
+    return np.where(which, copies(network, component).twin[atoms], atoms)
+
+
+def _n_rows(job: tuple[Int64, Int64]) -> int:
+    """How much there is to estimate: small ones go first and leave their time to large ones."""
+    return len(job[1])
+
+
+def _nothing_yet(n: int) -> Solution:
+    """A solution to be filled in."""
+    probability, error, low, high, r_hat, size = np.full((6, n), np.nan)
+    no = np.zeros(n, np.bool_)
+    return Solution(probability, error, low, high, r_hat, size, no, [""] * n, mixed=np.ones(n, np.bool_))
+
+
+def _enter(solution: Solution, rows: Int64, probability: Float, exact: Bool, methods: Sequence[str]) -> None:
+    """Writes down answers that are not sampled; nan for those that are not known, and for errors of guesses."""
+    solution.probability[rows], solution.exact[rows] = probability, exact
+    solution.error[rows] = np.where(exact, 0.0, np.nan)
+    for column in (solution.low, solution.high):
+        column[rows] = np.where(exact, probability, np.nan)
+    for row, method in zip(rows.tolist(), methods, strict=True):
+        solution.methods[row] = method
+
+
+def _formulas_exactly(
+    network: Network,
+    solution: Solution,
+    found: AtomProbabilities,
+    formulas: tuple[int, Sequence[Expression]],
+    approach: Approach,
+) -> None:
+    """Answers those formulas that touch no component past the limit, as far as that is possible."""
+    first, expressions = formulas
+    wide = set(found.wide)
+    rows = [
+        first + i
+        for i, f in enumerate(expressions)
+        if wide.isdisjoint(found.component[np.array(list(atom_numbers(f)), np.int64)].tolist())
+    ]
+    if not rows:
+        return
+    rung = _rung_by_name(approach)
+    limit, method = (approach.width_limit, ELIMINATION) if rung is None else (1, MODEL_COUNTING)
+    try:
+        probability = formula_probabilities(
+            network, [expressions[r - first] for r in rows], width_limit=limit, rung=rung
+        )
+    except LimitReached:
+        if approach.method in ("exact", "wmc"):
+            raise
+        return
+    _enter(solution, np.array(rows, np.int64), probability, np.ones(len(rows), np.bool_), [method] * len(rows))
+
+
+def _jobs(
+    found: AtomProbabilities, asked: tuple[Int64, Sequence[Expression]], rows: Int64
+) -> Iterator[tuple[Int64, Int64]]:
+    """What has to be sampled together: components, and the rows that are about them."""
+    atoms, formulas = asked
+    touched = [
+        atoms[r : r + 1] if r < len(atoms) else np.array(list(atom_numbers(formulas[r - len(atoms)])), np.int64)
+        for r in rows.tolist()
+    ]
+    group = np.arange(int(found.component.max(initial=-1)) + 1)
+    for row in touched:
+        mine = np.unique(group[found.component[row]])
+        if len(mine) > 1:
+            group[np.isin(group, mine)] = mine[0]
+    of_row = np.array([group[found.component[row[0]]] for row in touched], np.int64)
+    for g in np.unique(of_row):
+        yield np.flatnonzero(group == g), rows[of_row == g]
+
+
+def _enter_sample(
+    network: Network,
+    solution: Solution,
+    variables: Bool,
+    asked: tuple[Int64, Sequence[Expression], Int64],
+    approach: Approach,
+) -> None:
+    """Samples some components and writes down what that says about some rows."""
+    from mlnlite.infer.sample.sampling import Effort, sample
+
+    atoms, formulas, rows = asked
+    of_atoms, of_formulas = rows[rows < len(atoms)], rows[rows >= len(atoms)]
+    about = atoms[of_atoms], [formulas[i - len(atoms)] for i in of_formulas.tolist()]
+    effort = Effort(approach.precision, approach.time_limit, approach.chains, approach.seed)
+    estimates = sample(network, variables, about, SAMPLERS.get(approach.method), effort)
+    solution.probability[rows], solution.error[rows] = estimates.probability, estimates.error
+    solution.low[rows], solution.high[rows] = estimates.low, estimates.high
+    solution.r_hat[rows], solution.size[rows] = estimates.r_hat, estimates.size
+    solution.exact[rows], solution.mixed[rows] = estimates.exact, estimates.mixed
+    for row, method in zip(rows.tolist(), estimates.methods, strict=True):
+        solution.methods[row] = method
+    solution.endings.append(estimates.ending)
+    solution.traces |= {f"{name} ({len(solution.draws) + 1})": trace for name, trace in estimates.traces.items()}
+    solution.draws.append((rows, estimates.draws))

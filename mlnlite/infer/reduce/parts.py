@@ -1,0 +1,242 @@
+"""Takes potentials apart: components small enough to list their worlds, in batches of equal shape, and the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from mlnlite.ground.network import Bool, Float, Int32, Int64
+from mlnlite.infer.reduce.components import labels_of, rows_by_label
+from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.fill import Placed, fill
+from mlnlite.infer.reduce.potentials import Potentials
+
+SMALL = 1024
+_BATCH = 1 << 20
+_DECIMALS, _LARGEST, _EXACT = 4, 2.0**40, 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Components of equal shape with the log-weights of all their worlds.
+
+    Attributes:
+        components: shape (n,), their numbers.
+        variables: shape (n, k), the variable on each axis.
+        tables: shape (n, *cardinalities).
+    """
+
+    components: Int64
+    variables: Int64
+    tables: Float
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A component that is too large to list its worlds.
+
+    Attributes:
+        component: its number.
+        variables: shape (n,), its variables, rising.
+        cardinality: shape (n,).
+        cells: its cells, over indices of `variables`.
+    """
+
+    component: int
+    variables: Int64
+    cardinality: Int32
+    cells: tuple[Cells, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PartAnswer:
+    """What a solver says of the best world of a component.
+
+    Attributes:
+        world: shape (n,), a value for each variable, None if none was found (there may be none).
+        bound: no world has a larger log-weight than this; infinity if nothing is known.
+        optimal: whether `world` is proved best, up to rounding.
+        method: name of the solver.
+    """
+
+    world: Int64 | None
+    bound: float
+    optimal: bool
+    method: str
+
+
+@dataclass(frozen=True, slots=True)
+class Summed:
+    """What sums over all worlds of a component are, or what is taken for them.
+
+    Attributes:
+        log_z: log of the sum of all weights, minus infinity if no world is possible, nan if not known.
+        distributions: of the variables that were asked for.
+        method: how they were found.
+        exact: whether that is more than a guess.
+    """
+
+    log_z: float
+    distributions: dict[int, Float]
+    method: str
+    exact: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Division:
+    """The components of potentials.
+
+    Attributes:
+        potentials: of which.
+        label: shape (n_variables,), the component of each variable.
+        rank: shape (n_components,), place of each component, those of equal shape together, small ones first.
+        shapes: for each rank the sorted cardinalities of a small component, None for a large one.
+        members: variables in order of rank; those of one component by cardinality if it is small, else rising.
+        starts: shape (n_components + 1,), where each rank starts in `members`.
+        cells: sorted by rank.
+        cell_starts: for each of the cells, where each rank starts.
+    """
+
+    potentials: Potentials
+    label: Int32
+    rank: Int64
+    shapes: tuple[tuple[int, ...] | None, ...]
+    members: Int64
+    starts: Int64
+    cells: tuple[Cells, ...]
+    cell_starts: tuple[Int64, ...]
+
+    @property
+    def n_components(self) -> int:
+        """How many components there are."""
+        return len(self.rank)
+
+
+def divide(potentials: Potentials, small: int = SMALL) -> Division:
+    """Finds the components and sorts everything by them.
+
+    Args:
+        potentials: of a network.
+        small: up to how many worlds a component counts as small.
+    """
+    label = labels_of(len(potentials.cardinality), [c.scope for c in potentials.cells])
+    n = int(label.max(initial=-1)) + 1
+    bits = np.bincount(label, np.log2(potentials.cardinality), minlength=n)
+    is_small = bits <= np.log2(small) + 1e-9
+    order = np.lexsort((np.where(is_small[label], potentials.cardinality, 0), label))
+    starts = np.searchsorted(label[order], np.arange(n + 1))
+    sizes = potentials.cardinality[order]
+    keys = [tuple(sizes[starts[i] : starts[i + 1]].tolist()) if is_small[i] else None for i in range(n)]
+    by_rank = sorted(range(n), key=lambda i: (keys[i] is None, keys[i] or (), i))
+    rank = np.empty(n, np.int64)
+    rank[by_rank] = np.arange(n)
+    moved = np.argsort(rank[label[order]], kind="stable")
+    lengths = np.diff(starts)[by_rank]
+    cells, cell_starts = [], []
+    for c in potentials.cells:
+        rows, begin = rows_by_label(rank[label[c.scope[:, 0]]].astype(np.int32), n)
+        cells.append(Cells(c.scope[rows], c.value[rows], c.amount[rows]))
+        cell_starts.append(begin)
+    return Division(
+        potentials, label, rank, tuple(keys[i] for i in by_rank), order[moved],
+        np.concatenate([[0], np.cumsum(lengths)]), tuple(cells), tuple(cell_starts),
+    )  # fmt: skip
+
+
+def batches(division: Division, take: Bool) -> Iterator[Batch]:
+    """The small components among some, filled.
+
+    Args:
+        division: of potentials.
+        take: shape (n_components,), which of them.
+    """
+    axis = _place_in_component(division)
+    number = np.argsort(division.rank)
+    for first, last, shape in _stretches(division):
+        chosen = np.flatnonzero(take[number[first:last]])
+        if not len(chosen):
+            continue
+        variables = division.members[division.starts[first] : division.starts[last]].reshape(last - first, -1)
+        index = np.full(last - first, -1)
+        index[chosen] = np.arange(len(chosen))
+        placed = []
+        for c, begin in zip(division.cells, division.cell_starts, strict=True):
+            rows = np.arange(begin[first], begin[last])
+            table = index[division.rank[division.label[c.scope[rows, 0]]] - first]
+            rows, table = rows[table >= 0], table[table >= 0]
+            placed.append(Placed(table, axis[c.scope[rows]], c.value[rows].astype(np.int64), c.amount[rows]))
+        yield Batch(number[first:last][chosen], variables[chosen], fill(len(chosen), shape, placed))
+
+
+def _stretches(division: Division) -> Iterator[tuple[int, int, tuple[int, ...]]]:
+    """Ranks of small components of equal shape: first, last + 1, shape; a bounded number of table entries each."""
+    first = 0
+    for shape, group in groupby(s for s in division.shapes if s is not None):
+        end, step = first + len(list(group)), max(1, _BATCH // int(np.prod(shape)))
+        for begin in range(first, end, step):
+            yield begin, min(begin + step, end), shape
+        first = end
+
+
+def _place_in_component(division: Division) -> Int64:
+    """For each variable its index among the members of its component."""
+    place = np.empty(len(division.members), np.int64)
+    place[division.members] = np.arange(len(place)) - np.repeat(division.starts[:-1], np.diff(division.starts))
+    return place
+
+
+def parts(division: Division, take: Bool) -> Iterator[Part]:
+    """The large components among some.
+
+    Args:
+        division: of potentials.
+        take: shape (n_components,), which of them.
+    """
+    local = _place_in_component(division).astype(np.int32)
+    number = np.argsort(division.rank)
+    for r, shape in enumerate(division.shapes):
+        if shape is None and take[number[r]]:
+            variables = division.members[division.starts[r] : division.starts[r + 1]]
+            cells = tuple(
+                Cells(local[c.scope[b[r] : b[r + 1]]], c.value[b[r] : b[r + 1]], c.amount[b[r] : b[r + 1]])
+                for c, b in zip(division.cells, division.cell_starts, strict=True)
+                if b[r] < b[r + 1]
+            )
+            yield Part(int(number[r]), variables, division.potentials.cardinality[variables], cells)
+
+
+def identity(part: Part) -> object:
+    """Equal for components that differ in the names of their variables only (if they stand in the same order)."""
+    arrays = [a.tobytes() for c in part.cells for a in (c.scope, c.value, c.amount)]
+    return part.cardinality.tobytes(), *arrays
+
+
+def all_gains(part: Part) -> float:
+    """The sum of all gains, which no world can pass."""
+    return float(sum(c.amount[c.amount > 0].sum() for c in part.cells))
+
+
+def value_of(part: Part, world: Int64) -> float:
+    """Log-weight of a world of a component.
+
+    Args:
+        part: the component.
+        world: shape (n,), a value for each variable.
+    """
+    return float(sum(c.amount[(world[c.scope] == c.value).all(axis=1)].sum() for c in part.cells))
+
+
+def grain_of(amounts: Sequence[Float]) -> float:
+    """The log-weights of two worlds differ by a multiple of this; 0 if nothing of the kind is known.
+
+    Args:
+        amounts: all that worlds may gain or lose.
+    """
+    finite = np.concatenate([np.zeros(0), *amounts])
+    scaled = finite[np.isfinite(finite)] * 10.0**_DECIMALS
+    if np.abs(scaled).max(initial=0.0) > _LARGEST or np.abs(scaled - np.rint(scaled)).max(initial=0.0) > _EXACT:
+        return 0.0
+    return float(np.gcd.reduce(np.rint(scaled).astype(np.int64))) / 10.0**_DECIMALS

@@ -1,0 +1,1 @@
+"""Estimates with errors: chains of worlds, and what they say."""

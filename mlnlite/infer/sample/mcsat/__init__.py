@@ -1,0 +1,1 @@
+"""MC-SAT, compiled: slices of worlds, and draws from them."""

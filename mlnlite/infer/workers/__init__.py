@@ -1,0 +1,1 @@
+"""Solvers that need a process of their own."""

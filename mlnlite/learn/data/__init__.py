@@ -1,0 +1,1 @@
+"""Databases to what learning counts: choices, groundings, worlds."""

@@ -1,0 +1,166 @@
+"""Counting joins: for each atom, how many groundings of each template row become true or false when it does.
+
+No grounding is listed. For each conjunction of a formula, and each of its literals, a join of the *other* literals with
+the data gives the bindings in which that literal decides, and a count gathers them by atom and row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.engines.plan import Count, Plan, Run
+from mlnlite.ground.compile import Source, bindings, with_number
+from mlnlite.ground.ground import source_of
+from mlnlite.learn.data.separate import Case, cases
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.formulas import AtomRef, AtomSchema, Equal, Formula
+from mlnlite.model.propositional import Proposition, cubes
+from mlnlite.model.symbols import Predicate
+from mlnlite.model.templates import Template
+
+Int64 = NDArray[np.int64]
+
+DENSE = 4
+"""Sums are kept in a table if it has at most this many times as many places as there are entries."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entries:
+    """`change` groundings of weight `weight` become true when atom `atom` of `database` does (fewer if negative).
+
+    For an atom of a functional predicate, the change is against its block having no value. Entries that agree in
+    database, atom and weight add up. All arrays have shape (n,).
+    """
+
+    database: Int64
+    atom: Int64
+    weight: Int64
+    change: Int64
+
+
+def entries(templates: Sequence[Template], evidence: Evidence, run: Run, targets: frozenset[str]) -> dict[str, Entries]:
+    """The entries of all templates for the atoms of each target predicate.
+
+    Args:
+        templates: expanded.
+        evidence: complete: every atom that is not a fact is false.
+        run: runs plans over the tables of the evidence and the templates' rows.
+        targets: predicates whose atoms are counted for.
+    """
+    found: dict[str, list[Entries]] = {name: [] for name in targets}
+    first = 0
+    for i, template in enumerate(templates):
+        source = source_of(i, template, evidence, "database" if evidence.n_databases > 1 else None)
+        for sign, case in _cases(source):
+            for target, (schema, _) in enumerate(case.literals):
+                if schema.predicate in targets:
+                    found[schema.predicate] += _counted(source, case, target, sign, first, run)
+        first += len(template.weights)
+    return {name: _joined(parts, first) for name, parts in found.items()}
+
+
+def _cases(source: Source) -> Iterator[tuple[int, Case]]:
+    """The conjunctions whose sum, with these signs, is the formula's number of true groundings, but for a constant."""
+    false, true = cubes(source.formula.body, False), cubes(source.formula.body, True)
+    sign, chosen = (1, true) if len(true) < len(false) else (-1, false)
+    for cube in chosen:
+        for case in cases(source.formula, cube, source.evidence.predicates):
+            yield sign, case
+
+
+def _counted(source: Source, case: Case, target: int, sign: int, first: int, run: Run) -> list[Entries]:
+    schema, truth = case.literals[target]
+    predicate = source.evidence.predicates[schema.predicate]
+    others = _others(case, target, predicate)
+    if others is None:
+        return []
+    plan = _plan(source, case, others, schema)
+    rows = {name: column.astype(np.int64, copy=False) for name, column in run(plan).items()}
+    weight = rows["row"] + first if source.tabled else np.full(len(rows["count"]), first, np.int64)
+    change = rows["count"] * (sign if truth else -sign)
+    database = rows["database"] if source.world else np.zeros(len(change), np.int64)
+    return [Entries(database, rows["atom"], weight, change)]
+
+
+def _others(case: Case, target: int, predicate: Predicate) -> list[tuple[AtomSchema, bool]] | None:
+    """The literals that must hold for the target to decide; None if they cannot.
+
+    While the target's block has no value, its other atoms are false: negative literals hold, positive ones do not.
+    """
+    schema, _ = case.literals[target]
+    others = []
+    for i, (other, sign) in enumerate(case.literals):
+        if i == target:
+            continue
+        in_block = (
+            predicate.value is not None
+            and other.predicate == predicate.name
+            and all(other.arguments[k] == schema.arguments[k] for k in predicate.keys)
+        )
+        if in_block and sign:
+            return None
+        if not in_block:
+            others.append((other, sign))
+    return others
+
+
+def _plan(source: Source, case: Case, others: list[tuple[AtomSchema, bool]], target: AtomSchema) -> Plan:
+    schemas = tuple(schema for schema, _ in others)
+    formula: Formula = replace(source.formula, atoms=schemas)
+    cube: dict[Proposition, bool] = {AtomRef(i): sign for i, (_, sign) in enumerate(others)}
+    cube |= dict.fromkeys(case.different, False)
+    cube |= {Equal(variable, by): True for variable, by in case.same}
+    plan = bindings(replace(source, formula=formula), cube, source.formula.free)
+    plan = with_number(plan, source.evidence, target, "atom")
+    by = (*((source.world,) if source.world else ()), *(("row",) if source.tabled else ()), "atom")
+    return Count(plan, by)
+
+
+def _joined(parts: list[Entries], n_weights: int) -> Entries:
+    """All entries of a predicate in order, those of one atom and weight added up."""
+    if not parts:
+        empty = np.empty(0, np.int64)
+        return Entries(empty, empty, empty, empty)
+    database, atom, weight, change = (
+        np.concatenate([getattr(p, name) for p in parts]) for name in ("database", "atom", "weight", "change")
+    )
+    low = int(atom.min()) if len(atom) else 0
+    width = int(atom.max(initial=low)) - low + 1
+    size = (int(database.max(initial=0)) + 1) * width * n_weights
+    if size >= 2**62:
+        return _sorted(database, atom, weight, change)
+    key = (database * width + (atom - low)) * n_weights + weight
+    key, total = _added(key, change, size)
+    unit, weight = np.divmod(key, n_weights)
+    database, atom = np.divmod(unit, width)
+    return Entries(database, atom + low, weight, total)
+
+
+def _added(key: Int64, change: Int64, size: int) -> tuple[Int64, Int64]:
+    """Sums by key that are not zero, in order of keys. By a table where that is not much larger than the list."""
+    if size <= DENSE * len(key) + 1000:
+        total = np.bincount(key, change, size)
+        keys = np.flatnonzero(total)
+        return keys, total[keys].astype(np.int64)
+    order = np.argsort(key)
+    key, change = key[order], change[order]
+    starts = np.flatnonzero(np.diff(key, prepend=-1))
+    total = np.add.reduceat(change, starts)
+    keep = total != 0
+    return key[starts][keep], total[keep]
+
+
+def _sorted(database: Int64, atom: Int64, weight: Int64, change: Int64) -> Entries:
+    """The same for keys that do not fit into 64 bits."""
+    order = np.lexsort((weight, atom, database))
+    database, atom, weight, change = (a[order] for a in (database, atom, weight, change))
+    new = np.ones(len(order), bool)
+    new[1:] = (database[1:] != database[:-1]) | (atom[1:] != atom[:-1]) | (weight[1:] != weight[:-1])
+    starts = np.flatnonzero(new)
+    total = np.add.reduceat(change, starts)
+    keep = total != 0
+    return Entries(database[starts][keep], atom[starts][keep], weight[starts][keep], total[keep])

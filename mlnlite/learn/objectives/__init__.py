@@ -1,0 +1,1 @@
+"""What is maximised: pseudo-likelihood, likelihoods, margins."""

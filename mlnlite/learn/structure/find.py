@@ -1,0 +1,237 @@
+"""Databases to rules: candidates along the paths of the data, chosen by score tests, refitted, pruned.
+
+All candidates are counted at once and share one list of choices; adding one costs a gradient, a column of the Hessian
+and a refit from the last weights. A rule is added while its score test beats what the Bayesian information criterion
+asks for another weight and, corrected for the number of candidates, the false-discovery rate; rules whose Wald
+statistic falls below that when others have come are dropped again. (Rao 1948; Schwarz 1978; Benjamini, Hochberg 1995.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.stats import chi2
+
+from mlnlite.errors import QueryMistake
+from mlnlite.learn.data.merge import Choices
+from mlnlite.learn.evaluation.evaluate import target_names
+from mlnlite.learn.objectives.choose import pseudo_problem
+from mlnlite.learn.optimise import information
+from mlnlite.learn.optimise.problem import Problem
+from mlnlite.learn.optimise.solve import best
+from mlnlite.learn.prior import Penalty
+from mlnlite.learn.structure.candidates import candidates, rule_text
+from mlnlite.model.evidence import Evidence
+from mlnlite.model.formulas import AtomRef
+from mlnlite.model.model import Model
+from mlnlite.model.read import model_from_text
+from mlnlite.model.unparse import model_text
+
+Float = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+PRECISION = 0.04
+"""Of the Gaussian prior of each weight during the search: standard deviation 5."""
+
+FALSE_DISCOVERIES = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A rule that was found.
+
+    Attributes:
+        text: as a model writes it.
+        weight: its weight among the others.
+        score: of the score test when it was added.
+        p_value: of the same, for one candidate.
+        stability: in which share of bootstrap samples it is found.
+    """
+
+    text: str
+    weight: float
+    score: float
+    p_value: float
+    stability: float
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """Rules that were found.
+
+    Attributes:
+        rules: the best first.
+        model: the model with the rules.
+        n_candidates: how many rules were tried.
+    """
+
+    rules: tuple[Rule, ...]
+    model: Model
+    n_candidates: int
+
+    def __str__(self) -> str:
+        """A table."""
+        lines = [f"{'score':>9}  {'p':>8}  {'stable':>6}  rule"]
+        lines += [f"{r.score:9.1f}  {r.p_value:8.1e}  {100 * r.stability:5.0f}%  {r.text}" for r in self.rules]
+        return "\n".join([*lines, f"{len(self.rules)} of {self.n_candidates:,} candidates"])
+
+
+def find_rules(
+    model: Model,
+    databases: Evidence,
+    *,
+    predict: Iterable[str],
+    given: Iterable[str] | None = None,
+    most_literals: int = 2,
+    most_rules: int = 20,
+    resamples: int = 20,
+    seed: int = 0,
+) -> Structure:
+    """Rules that explain some predicates by others.
+
+    Args:
+        model: the vocabulary, and formulas that are kept.
+        databases: complete.
+        predict: predicates that rules conclude.
+        given: predicates that rules may ask about; by default all.
+        most_literals: of a rule's body.
+        most_rules: how many to add.
+        resamples: bootstrap samples for the stability of the rules; atoms are drawn, as if independent.
+        seed: of the bootstrap.
+
+    Raises:
+        QueryMistake: if there is no candidate.
+    """
+    targets = target_names(databases, predict)
+    names = list(model.predicates if given is None else given)
+    rules = [rule_text(r) for r in candidates(model.predicates, targets, names, most_literals)]
+    units = [_unit(model, name) for name in targets if not _has_unit(model, name)]
+    if not rules:
+        raise QueryMistake("there is no rule to try", "name more predicates, or allow longer bodies")
+    every = model_from_text("\n".join([model_text(model), *units, *rules]), dialect=model.dialect)
+    every = replace(every, templates=tuple(t.expanded(databases.types) for t in every.templates))
+    problem = pseudo_problem(every, databases, frozenset(targets))
+    column_of = {int(w): j for j, w in enumerate(problem.free)}
+    n_weights = sum(len(t.weights) for t in every.templates)
+    tried = {
+        column_of[w]: r for w, r in zip(range(n_weights - len(rules), n_weights), rules, strict=True) if w in column_of
+    }
+    found = _search(problem, tried, most_rules)
+    kept = _stability(problem, tried, most_rules, (resamples, seed))
+    made = [
+        Rule(tried[j], float(found.x[j]), s, float(chi2.sf(s, 1)), kept.get(j, 0.0)) for j, s in found.columns.items()
+    ]
+    result = model_from_text("\n".join([model_text(model), *units, *(r.text for r in made)]), dialect=model.dialect)
+    return Structure(tuple(made), result, len(rules))
+
+
+def _unit(model: Model, name: str) -> str:
+    """The formula that says how frequent a predicate is."""
+    predicate = model.predicates[name]
+    inside = ", ".join(("+" if i == predicate.value else "") + f"x{i}" for i in range(predicate.arity))
+    return f"{name}({inside})" if inside else name
+
+
+def _has_unit(model: Model, name: str) -> bool:
+    """Whether the model has a formula that is a single atom of a predicate."""
+    return any(
+        isinstance(t.formula.body, AtomRef) and t.formula.atoms[t.formula.body.index].predicate == name
+        for t in model.templates
+    )
+
+
+def _stability(problem: Problem, tried: dict[int, str], most_rules: int, samples: tuple[int, int]) -> dict[int, float]:
+    """In which share of bootstrap samples (their number, seed) each column is found."""
+    n, seed = samples
+    random, share = np.random.default_rng(seed), dict.fromkeys(tried, 0.0)
+    for _ in range(n):
+        for j in _search(_resampled(problem, random), tried, most_rules).columns:
+            share[j] += 1 / n
+    return share
+
+
+def _resampled(problem: Problem, random: np.random.Generator) -> Problem:
+    """The problem with choices drawn again."""
+    found = problem.every
+    n = int(found.many.sum())
+    many = random.multinomial(n, found.many / found.many.sum()).astype(float)
+    return replace(problem, every=replace(found, many=many))
+
+
+# --- the search
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Columns of the rules that were chosen with their scores, and the weights of all columns."""
+
+    columns: dict[int, float]
+    x: Float
+
+
+def _search(problem: Problem, tried: dict[int, str], most_rules: int) -> _Found:
+    n = problem.every.rows.shape[1]
+    fixed = [j for j in range(n) if j not in tried]
+    needed = max(float(np.log(max(2.0, problem.every.many.sum()))), _threshold(len(tried)))
+    chosen: dict[int, float] = {}
+    x = _fitted(problem, fixed, np.zeros(n))
+    while len(chosen) < most_rules:
+        scores = _scores(problem.every, x, [*fixed, *chosen])
+        scores[[*fixed, *chosen]] = 0.0
+        column = int(scores.argmax())
+        if scores[column] <= needed:
+            break
+        chosen[column] = float(scores[column])
+        x = _fitted(problem, [*fixed, *chosen], x)
+        weak = _weak(problem.every, x, fixed, chosen, needed)
+        if column in weak:
+            del chosen[column]
+            x = _fitted(problem, [*fixed, *chosen], x)
+            break
+        if weak:
+            chosen = {j: s for j, s in chosen.items() if j not in weak}
+            x = _fitted(problem, [*fixed, *chosen], x)
+    return _Found(chosen, x)
+
+
+def _threshold(n_candidates: int) -> float:
+    """Chi-squared value that the best of this many candidates passes by chance with the rate allowed."""
+    return float(chi2.isf(FALSE_DISCOVERIES / max(1, n_candidates), 1))
+
+
+def _fitted(problem: Problem, columns: Sequence[int], start: Float) -> Float:
+    """The best weights of some columns, the others 0."""
+    chosen = np.array(sorted(columns), np.int64)
+    x = np.zeros(len(start))
+    if not len(chosen):
+        return x
+    rows = sparse.csr_array(problem.every.rows[:, chosen])
+    part = replace(problem, every=replace(problem.every, rows=rows), free=problem.free[chosen])
+    none = np.zeros(len(chosen))
+    x[chosen] = best(part, Penalty(none, none + PRECISION, none, none), start[chosen], None).x
+    return x
+
+
+def _scores(found: Choices, x: Float, active: Sequence[int]) -> Float:
+    """Score statistic of each column, the active ones being at their best."""
+    at = np.array(sorted(active), np.int64)
+    slope = np.asarray(found.many @ information.expected_rows(found, x))
+    diagonal, coupled = information.columns(found, x, at)
+    inverse = np.linalg.pinv(coupled[at] + PRECISION * np.eye(len(at)), hermitian=True)
+    left = diagonal - np.einsum("ij,jk,ik->i", coupled, inverse, coupled)
+    usable = left > 1e-6 * np.maximum(diagonal, 1.0)
+    return np.asarray(np.where(usable, slope**2 / np.where(usable, left, 1.0), 0.0))
+
+
+def _weak(found: Choices, x: Float, fixed: Sequence[int], chosen: dict[int, float], needed: float) -> set[int]:
+    """Chosen columns whose Wald statistic is too small."""
+    at = np.array(sorted([*fixed, *chosen]), np.int64)
+    part = replace(found, rows=sparse.csr_array(found.rows[:, at]))
+    bend = np.asarray(information.hessian(part, x[at]).todense(), float)
+    variance = np.linalg.pinv(bend + PRECISION * np.eye(len(at)), hermitian=True).diagonal()
+    wald = dict(zip(at.tolist(), (x[at] ** 2 / np.maximum(variance, 1e-300)).tolist(), strict=True))
+    return {j for j in chosen if wald[j] < needed}

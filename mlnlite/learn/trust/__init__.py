@@ -1,0 +1,1 @@
+"""How far learnt weights can be trusted: errors, tests, warnings."""
