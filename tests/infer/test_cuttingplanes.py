@@ -6,15 +6,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mlnlite as ml
-from mlnlite.infer.map.cuts import lazy_program
+from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.map.cuts import ascent, lazy_program
+from mlnlite.infer.map.cuts.ascent_kernel import sweep
 from mlnlite.infer.map.cuts.cuttingplanes import map_lazily
 from mlnlite.infer.map.cuts.lazy_program import base_of
 from mlnlite.infer.map.cuts.partition import partition, partitioned, transitive
 from mlnlite.infer.map.cuts.rows import Rows, add_clauses, add_stars, names_of, with_rows
-from mlnlite.infer.map.cuts.separation import lack, near_violations, stars
+from mlnlite.infer.map.cuts.separation import excuses, graph_of, lack, near_violations, stars
 from mlnlite.infer.map.cuts.star_kernel import grow
 from mlnlite.infer.map.cuts.waiting import violated_weight, without_lazy
 from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.map.relaxation import solve_program
 from mlnlite.infer.map.rungs import Options
 
 TEXTS = {
@@ -69,7 +72,8 @@ def test_stars_and_clauses_hold_in_every_world(seed, weight, name):
     rows = Rows(base.program.n_columns)
     add_clauses(rows, near, weights)
     n_clauses = len(rows)
-    found = stars(near, x, np.zeros(len(near)))
+    graph = graph_of(near, x, np.zeros(len(near)))
+    found = stars(graph, excuses(near, graph, x), x)
     add_stars(rows, found, near, weights)
     program = with_rows(base.program, rows)
     matrix = np.zeros((len(rows), program.n_columns))
@@ -153,10 +157,56 @@ def test_stars_grow_as_their_python_does():
         assert value == pytest.approx(arguments[4][m].sum() - excuse[c].sum() - 1)
 
 
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000), weight=st.sampled_from([None, 0.7]), name=st.sampled_from(list(TEXTS)))
+def test_no_world_passes_what_an_ascent_proves(seed, weight, name):
+    model, evidence = example(np.random.default_rng(seed), name, weight, symmetric=bool(seed % 2))
+    lazy = without_lazy(model, evidence, [len(model.templates) - 1])
+    base = base_of(lazy)
+    search = lazy_program._Search(lazy, base, Rows(base.program.n_columns), lazy_program.Found(), Options(), None, 0.0)
+    lazy_program._ascend(search)
+    best = map_of(ml.ground(model, evidence)).log_weight
+    assert search.found.bound >= best - 1e-6
+    _x, _multipliers, least = solve_program(base.part, with_rows(base.program, search.rows), Deadline(), exact=True)
+    assert least + base.constant >= best - 1e-6
+
+
+def test_an_ascent_gets_as_far_as_a_linear_program():
+    from benchmarks import generators
+
+    model, evidence = generators.entities(40, 0.2)
+    lazy = without_lazy(model, evidence, [3])
+    base = base_of(lazy)
+    search = lazy_program._Search(lazy, base, Rows(base.program.n_columns), lazy_program.Found(), Options(), None, 0.0)
+    lazy_program._ascend(search)
+    found = search.found.bound
+    least = solve_program(base.part, with_rows(base.program, search.rows), Deadline(), exact=True)[2] + base.constant
+    assert least - 1e-6 <= found <= least + 0.01 * abs(least)
+
+
+def test_steps_of_an_ascent_are_as_in_python():
+    rng = np.random.default_rng(0)
+    size = rng.integers(1, 6, 20)
+    start = np.concatenate([[0], np.cumsum(size)])
+    column, value = rng.integers(0, 15, start[-1]), rng.choice([-1.0, 1.0], start[-1])
+    results = []
+    for function in (sweep, sweep.py_func):
+        multiplier, gain = np.zeros(20), rng.normal(0, 2, 15) if not results else results[0][2].copy()
+        before = gain.copy()
+        for softness in (1.0, 0.3, 0.1):
+            function(np.arange(20), start, column, value, np.ones(20), softness, multiplier, gain)
+        assert (multiplier >= 0).all()
+        taken = np.bincount(column, value * np.repeat(multiplier, size), 15)
+        np.testing.assert_allclose(gain, before - taken, atol=1e-9)
+        results.append((multiplier, gain, before))
+    np.testing.assert_allclose(results[0][0], results[1][0], atol=1e-9)
+
+
 def test_linear_programs_that_do_not_end_on_a_world_are_rounded_off(monkeypatch):
     from benchmarks import generators
 
-    monkeypatch.setattr(lazy_program, "stars", lambda near, x, paid: stars(near, x, paid).pick(np.zeros(0, int)))
+    for module in (lazy_program, ascent):
+        monkeypatch.setattr(module, "stars", lambda *arguments: stars(*arguments).pick(np.zeros(0, int)))
     model, evidence = generators.entities(14, 0.2)
     with_stars = map_lazily(without_lazy(model, evidence, [3]), Options())[1]
     assert with_stars.status == "optimal"

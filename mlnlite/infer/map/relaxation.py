@@ -96,7 +96,8 @@ def bound_of(part: Part, program: Program, multipliers: Float) -> tuple[float, F
     `min c x >= y b + min (c - A' y) x` for `y <= 0`, and the last part is taken column by column within its limits.
 
     Returns:
-        The bound, and for each column what to add to it (0 or less) for worlds in which that column is 1.
+        The bound, and the reduced cost of each column, `c - A' y`: worlds in which the column is 1 pass the bound less
+        this if it is positive.
     """
     model = model_of(program, 0)
     shape = program.n_rows, program.n_columns
@@ -106,4 +107,4 @@ def bound_of(part: Part, program: Program, multipliers: Float) -> tuple[float, F
     reduced = np.array(model.col_cost_) - matrix.T @ y
     columns = np.minimum(0.0, reduced) * np.array(model.col_upper_)
     least = float(y @ np.array(model.row_upper_) + columns.sum() + model.offset_)
-    return all_gains(part) - least, -np.maximum(0.0, reduced)
+    return all_gains(part) - least, reduced

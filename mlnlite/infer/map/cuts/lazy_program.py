@@ -1,8 +1,9 @@
 """Best worlds by a program that grows: comes in a network without its lazy groundings, goes out a world and a bound.
 
-The linear relaxation is solved (interior point, from the middle of the best face, where separation finds most), rows
-that its solution violates are added and slack ones dropped, until nothing is violated. If the solution is not a world
-by then, the rows that are left make an integer program, to which violated groundings are added as well.
+Coordinate ascent finds most of the rows, and a bound. Then the linear relaxation is solved (interior point, from the
+middle of the best face, where separation finds most), rows that its solution violates are added and slack ones dropped,
+until nothing is violated. If the solution is not a world by then, the rows that are left make an integer program, to
+which violated groundings are added as well.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ import numpy as np
 from mlnlite.engines.plan import Engine
 from mlnlite.ground.network import Bool, Float, Int64
 from mlnlite.infer.map import ilp, relaxation
+from mlnlite.infer.map.cuts.ascent import ascend
 from mlnlite.infer.map.cuts.rows import Rows, add_clauses, add_stars, drop_slack, least_used, paid_so_far, with_rows
-from mlnlite.infer.map.cuts.separation import Reading, lack, near_violations, stars
+from mlnlite.infer.map.cuts.separation import Reading, excuses, graph_of, lack, near_violations, stars
 from mlnlite.infer.map.cuts.waiting import Lazy, violated_weight
 from mlnlite.infer.map.rungs import Options
 from mlnlite.infer.reduce.costs import with_costs
@@ -107,7 +109,9 @@ def grow(lazy: Lazy, start: Bool | None, options: Options, engine: Engine | None
     )
     if start is not None:
         _consider(search, start)
-    _relax(search)
+    _ascend(search)
+    if not _is_done(search):
+        _relax(search)
     if not _is_done(search):
         _round_off(search)
     found.n_groundings = rows.n_groundings
@@ -127,10 +131,16 @@ class _Search:
 
 def _is_done(search: _Search) -> bool:
     """Whether to stop: proved, close enough, or out of time."""
-    found, options = search.found, search.options
+    found = search.found
     if found.gap < search.grain - _CLOSE:
         found.bound = found.value
-    return options.deadline.is_over or found.gap <= max(_CLOSE, options.gap * _cost(search))
+    return _is_enough(search, found.bound)
+
+
+def _is_enough(search: _Search, bound: float) -> bool:
+    """Whether such a bound would do, or time is over."""
+    options, gap = search.options, bound - search.found.value
+    return options.deadline.is_over or gap <= max(_CLOSE, search.grain - _CLOSE, options.gap * _cost(search))
 
 
 def _cost(search: _Search) -> float:
@@ -158,17 +168,40 @@ def _world(search: _Search, x: Float) -> Bool:
     return truth_of(search.lazy.network, values)
 
 
+def _ascend(search: _Search) -> None:
+    """A bound from many stars, found by coordinate ascent from the first linear program."""
+    base, rows, options = search.base, search.rows, search.options
+    x, multipliers, _ = relaxation.solve_program(base.part, base.program, options.deadline, exact=False)
+    if x is None:
+        return
+    reduced = _prove(search, multipliers)
+    bound, n = search.found.bound, base.columns.n
+    may = np.where((reduced[:n] < 0) | (x[:n] > _VIOLATED), 0.5, 0.0)
+    clauses = near_violations(search.lazy, base.reading, may, search.engine)
+    weights = search.lazy.network.weights
+    more = ascend(rows, clauses, weights, -reduced, options.seed, lambda lower: _is_enough(search, bound - lower))
+    _prove(search, np.append(multipliers, -more))
+
+
+def _prove(search: _Search, multipliers: Float) -> Float:
+    """Takes the bound that multipliers prove of the program with its rows; returns the reduced costs."""
+    base = search.base
+    bound, reduced = relaxation.bound_of(base.part, with_rows(base.program, search.rows), multipliers)
+    search.found.bound = min(search.found.bound, base.constant + bound)
+    _fix(search, base.constant + bound - np.maximum(0.0, reduced))
+    return reduced
+
+
 def _relax(search: _Search) -> None:
     """Linear programs, until no row is violated, or a world is proved."""
     exact, n_same, rng = False, 0, np.random.default_rng(search.options.seed)
     while not search.options.deadline.is_over and n_same < _STALLED:
         before, part = search.found.bound, search.base.part
         program = with_rows(search.base.program, search.rows)
-        x, multipliers, bound = relaxation.solve_program(part, program, search.options.deadline, exact=exact)
+        x, multipliers, _ = relaxation.solve_program(part, program, search.options.deadline, exact=exact)
         if x is None:
             return
-        search.found.bound = min(search.found.bound, search.base.constant + bound)
-        _fix(search, search.base.constant + bound + relaxation.bound_of(part, program, multipliers)[1])
+        _prove(search, multipliers)
         drop_slack(search.rows, x, multipliers[search.base.program.n_rows :])
         n_added = _separate(search, x, rng)
         if not n_added or (np.minimum(x, 1 - x) > _VIOLATED).mean() < _NEARLY:
@@ -195,7 +228,8 @@ def _separate(search: _Search, x: Float, rng: np.random.Generator) -> int:
     rows, weights, before = search.rows, search.lazy.network.weights, len(search.rows)
     near = near_violations(search.lazy, search.base.reading, x[: search.base.columns.n], search.engine)
     paid = paid_so_far(rows, near, weights, x)
-    found = stars(near, x, paid)
+    graph = graph_of(near, x, paid)
+    found = stars(graph, excuses(near, graph, x) + paid, x)
     size = (found.sign != 0).sum(axis=1)
     starts = np.concatenate([[0], np.cumsum(size)])
     best = np.argsort(-found.above / np.sqrt(np.maximum(size, 1)), kind="stable")

@@ -81,8 +81,12 @@ def add_clauses(rows: Rows, clauses: GroundClauses, weights: Float) -> None:
     append(rows, column, value, (clauses.sign < 0).sum(axis=1) - 1.0)
 
 
-def add_stars(rows: Rows, found: Stars, clauses: GroundClauses, weights: Float) -> None:
-    """A row for each star: its literals less the excuses, and what is paid for not having one, are at most 1."""
+def add_stars(rows: Rows, found: Stars, clauses: GroundClauses, weights: Float) -> Int64:
+    """A row for each star: its literals less the excuses, and what is paid for not having one, are at most 1.
+
+    Returns:
+        Shape (n_clauses,), the column that says how far a clause of these stars is violated, else -1.
+    """
     used = np.unique(found.clause[found.clause >= 0])
     paid = np.full(len(clauses), -1, np.int64)
     paid[used] = columns_paid(rows, clauses.pick(used), weights)
@@ -93,6 +97,7 @@ def add_stars(rows: Rows, found: Stars, clauses: GroundClauses, weights: Float) 
     column = np.hstack([found.column, clauses.column[at], np.where(pays, paid[c], 0)])
     value = np.hstack([found.sign, -excuse_sign, np.where(pays, -1.0, 0.0)])
     append(rows, column, value, 1.0 - (found.sign < 0).sum(axis=1) + (excuse_sign < 0).sum(axis=1))
+    return paid
 
 
 def append(rows: Rows, column: Int64, value: Float, limit: Float) -> None:
@@ -108,7 +113,12 @@ def drop_slack(rows: Rows, x: Float, multipliers: Float) -> None:
     """Drops the rows that a solution neither touches nor needs."""
     n = np.diff(rows.start)
     activity = np.bincount(np.repeat(np.arange(len(rows)), n), rows.value * x[rows.column], len(rows))
-    keep = (activity > rows.limit - _SLACK) | (multipliers < -_SLACK)
+    retain(rows, (activity > rows.limit - _SLACK) | (multipliers < -_SLACK))
+
+
+def retain(rows: Rows, keep: Bool) -> None:
+    """Drops all rows but these."""
+    n = np.diff(rows.start)
     inside = np.repeat(keep, n)
     rows.column, rows.value, rows.limit = rows.column[inside], rows.value[inside], rows.limit[keep]
     rows.start = np.concatenate([[0], np.cumsum(n[keep])])

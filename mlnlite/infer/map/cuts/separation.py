@@ -149,45 +149,84 @@ def lack(clauses: GroundClauses, x: Float) -> Float:
     return np.asarray(1 - truths(clauses.column, clauses.sign, x).sum(axis=1))
 
 
-def stars(clauses: GroundClauses, x: Float, paid: Float) -> Stars:
-    """Violated stars among some clauses, each found once.
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """Which literals need an excuse to hold together: literals, and clauses between them.
+
+    Attributes:
+        column: shape (n,), of each literal.
+        sign: shape (n,), of each literal.
+        begin: shape (n + 1,), where the neighbours of each literal start.
+        other: shape (m,), the neighbour.
+        clause: shape (m,), the clause that asks for an excuse.
+        excuse: shape (n_clauses,), place of the excuse among the literals of each clause.
+    """
+
+    column: Int64
+    sign: Float
+    begin: Int64
+    other: Int64
+    clause: Int64
+    excuse: Int64
+
+
+def graph_of(clauses: GroundClauses, x: Float, paid: Float) -> Graph:
+    """The graph of those clauses of three literals of which two need the third as an excuse.
 
     Args:
-        clauses: near to be violated.
-        x: shape (n_columns,), a fractional solution.
-        paid: shape (n_clauses,), how far each clause counts as paid for.
+        clauses: any.
+        x: shape (n_columns,), a fractional solution; of clauses over the same two literals that one is taken of which
+            the excuse is least true
+        paid: shape (n_clauses,), and which is least paid for.
     """
-    from mlnlite.infer.map.cuts.star_kernel import grow
-
     whole = (np.abs(clauses.sign).sum(axis=1) == 3) & (np.abs(clauses.sign.sum(axis=1)) == 1)
     rows = np.flatnonzero(whole)
     odd = clauses.sign == -clauses.sign.sum(axis=1, keepdims=True)
     excuse = np.where(whole, odd.argmax(axis=1), 0)
+    value = _held(clauses, excuse, x) + paid
     others = np.argsort(odd[rows] | (clauses.sign[rows] == 0), axis=1, kind="stable")[:, :2]
     ends = [np.take_along_axis(a[rows], others, 1) for a in (clauses.column, clauses.sign)]
     names, node = np.unique(2 * ends[0] + (ends[1] < 0), return_inverse=True)
     node = node.reshape(-1, 2)
-    at = (rows, excuse[rows])
-    value = truths(clauses.column[at], clauses.sign[at], x) + paid[rows]
-    begin, other, edge = _graph(node, value, len(names))
-    # a thing holds where its literal in the clauses does not
-    holds = truths(np.asarray(names // 2, np.int64), np.where(names % 2 == 1, 1.0, -1.0), x)
-    members, clause, above = grow(begin, other, value[edge], rows[edge], holds, _LEAST, _LARGEST)
-    found = np.flatnonzero(above > _LEAST)
-    _, once = np.unique(np.sort(members[found], axis=1), axis=0, return_index=True)
-    found = found[once]
-    inside = members[found] >= 0
-    code = names[np.maximum(members[found], 0)] if len(names) else members[found]
-    sign = np.where(inside, np.where(code % 2 == 1, 1.0, -1.0), 0.0)
-    return Stars(np.where(inside, code // 2, 0), sign, clause[found], excuse, above[found])
-
-
-def _graph(node: Int64, value: Float, n: int) -> tuple[Int64, Int64, Int64]:
-    """For each node its neighbours, each once, by the edge of least value: where they start, who, and which edge."""
     edge = np.tile(np.arange(len(node)), 2)
     start, end = np.concatenate([node[:, 0], node[:, 1]]), np.concatenate([node[:, 1], node[:, 0]])
-    order = np.lexsort((value[edge], end, start))
+    order = np.lexsort((value[rows][edge], end, start))
     start, end, edge = start[order], end[order], edge[order]
     first = np.ones(len(order), np.bool_)
     first[1:] = (start[1:] != start[:-1]) | (end[1:] != end[:-1])
-    return np.searchsorted(start[first], np.arange(n + 1)), end[first], edge[first]
+    begin = np.searchsorted(start[first], np.arange(len(names) + 1))
+    # a thing holds where its literal in the clauses does not
+    column = np.asarray(names // 2, np.int64)
+    return Graph(column, np.where(names % 2 == 1, 1.0, -1.0), begin, end[first], rows[edge[first]], excuse)
+
+
+def excuses(clauses: GroundClauses, graph: Graph, x: Float) -> Float:
+    """How true the excuse of each clause is."""
+    return _held(clauses, graph.excuse, x)
+
+
+def _held(clauses: GroundClauses, place: Int64, x: Float) -> Float:
+    """How true the literal at some place of each clause is."""
+    at = (np.arange(len(clauses)), place)
+    return truths(clauses.column[at], clauses.sign[at], x)
+
+
+def stars(graph: Graph, excuse: Float, x: Float, least: float = _LEAST) -> Stars:
+    """Violated stars, each found once.
+
+    Args:
+        graph: of clauses.
+        excuse: shape (n_clauses,), how true their excuses are, or how far they count as paid for.
+        x: shape (n_columns,), a fractional solution.
+        least: by how much violated.
+    """
+    from mlnlite.infer.map.cuts.star_kernel import grow
+
+    holds = truths(graph.column, graph.sign, x)
+    members, clause, above = grow(graph.begin, graph.other, excuse[graph.clause], graph.clause, holds, _LEAST, _LARGEST)
+    found = np.flatnonzero(above > least)
+    _, once = np.unique(np.sort(members[found], axis=1), axis=0, return_index=True)
+    found = found[once]
+    inside, at = members[found] >= 0, np.maximum(members[found], 0)
+    column = np.where(inside, graph.column[at], 0)
+    return Stars(column, np.where(inside, graph.sign[at], 0.0), clause[found], graph.excuse, above[found])
