@@ -17,11 +17,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from mlnlite.domains import handover
-from mlnlite.domains.handover.grasps import sample_grasps
-from mlnlite.domains.handover.objects import object_names, read_object
-from mlnlite.domains.handover.receiver import Body, read_receiver
-from mlnlite.domains.handover.scene import Layout, make_scene
-from mlnlite.domains.handover.search import optimise
+from mlnlite.domains.handover.scene.grasps import sample_grasps
+from mlnlite.domains.handover.scene.objects import object_names, read_object
+from mlnlite.domains.handover.scene.receiver import Body, read_receiver
+from mlnlite.domains.handover.scene.scene import Layout, make_scene
+from mlnlite.domains.handover.search.hierarchical import optimise
 
 LEVELS = ("H", "H-M", "L-M", "L")
 ROBOTS = ("pr2", "panda")

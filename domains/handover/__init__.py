@@ -15,23 +15,10 @@ from mlnlite import MissingPart, Plugin
 if TYPE_CHECKING:
     import click
 
-    from mlnlite.domains.handover.checks import Check as Check
-    from mlnlite.domains.handover.checks import five_checks as five_checks
-    from mlnlite.domains.handover.checks import violations as violations
-    from mlnlite.domains.handover.costs import Limits as Limits
-    from mlnlite.domains.handover.costs import appropriateness as appropriateness
-    from mlnlite.domains.handover.costs import reachability as reachability
-    from mlnlite.domains.handover.costs import safety as safety
-    from mlnlite.domains.handover.effort import Effort as Effort
-    from mlnlite.domains.handover.effort import effort_at as effort_at
-    from mlnlite.domains.handover.effort import effort_of as effort_of
-    from mlnlite.domains.handover.effort import reachable_set as reachable_set
-    from mlnlite.domains.handover.fields import Options as Options
-    from mlnlite.domains.handover.fields import cost_field as cost_field
-    from mlnlite.domains.handover.grasps import sample_grasps as sample_grasps
-    from mlnlite.domains.handover.ik import damped_least_squares as damped_least_squares
     from mlnlite.domains.handover.instances.generate import facts_of as facts_of
     from mlnlite.domains.handover.instances.generate import generate as generate
+    from mlnlite.domains.handover.kinematics.ik import damped_least_squares as damped_least_squares
+    from mlnlite.domains.handover.kinematics.pose import Pose as Pose
     from mlnlite.domains.handover.knowledge.advise import Advice as Advice
     from mlnlite.domains.handover.knowledge.advise import advice_text as advice_text
     from mlnlite.domains.handover.knowledge.advise import advise as advise
@@ -45,47 +32,60 @@ if TYPE_CHECKING:
     from mlnlite.domains.handover.knowledge.train import train as train
     from mlnlite.domains.handover.knowledge.train import write_knowledge as write_knowledge
     from mlnlite.domains.handover.knowledge.words import read_knowledge as read_knowledge
-    from mlnlite.domains.handover.methods import hand_over as hand_over
-    from mlnlite.domains.handover.mobility import MobilityLevel as MobilityLevel
-    from mlnlite.domains.handover.mobility import read_levels as read_levels
-    from mlnlite.domains.handover.objects import HandoverObject as HandoverObject
-    from mlnlite.domains.handover.objects import object_names as object_names
-    from mlnlite.domains.handover.objects import read_object as read_object
-    from mlnlite.domains.handover.pose import Pose as Pose
-    from mlnlite.domains.handover.receiver import Body as Body
-    from mlnlite.domains.handover.receiver import Receiver as Receiver
-    from mlnlite.domains.handover.receiver import read_receiver as read_receiver
-    from mlnlite.domains.handover.robots import Gripper as Gripper
-    from mlnlite.domains.handover.robots import Robot as Robot
-    from mlnlite.domains.handover.robots import read_robot as read_robot
-    from mlnlite.domains.handover.scene import Layout as Layout
-    from mlnlite.domains.handover.scene import Scene as Scene
-    from mlnlite.domains.handover.scene import make_scene as make_scene
-    from mlnlite.domains.handover.search import Configuration as Configuration
-    from mlnlite.domains.handover.search import Handover as Handover
-    from mlnlite.domains.handover.search import optimise as optimise
-    from mlnlite.domains.handover.search import require as require
+    from mlnlite.domains.handover.scene.effort import Effort as Effort
+    from mlnlite.domains.handover.scene.effort import effort_at as effort_at
+    from mlnlite.domains.handover.scene.effort import effort_of as effort_of
+    from mlnlite.domains.handover.scene.effort import reachable_set as reachable_set
+    from mlnlite.domains.handover.scene.grasps import sample_grasps as sample_grasps
+    from mlnlite.domains.handover.scene.mobility import MobilityLevel as MobilityLevel
+    from mlnlite.domains.handover.scene.mobility import read_levels as read_levels
+    from mlnlite.domains.handover.scene.objects import HandoverObject as HandoverObject
+    from mlnlite.domains.handover.scene.objects import object_names as object_names
+    from mlnlite.domains.handover.scene.objects import read_object as read_object
+    from mlnlite.domains.handover.scene.receiver import Body as Body
+    from mlnlite.domains.handover.scene.receiver import Receiver as Receiver
+    from mlnlite.domains.handover.scene.receiver import read_receiver as read_receiver
+    from mlnlite.domains.handover.scene.robots import Gripper as Gripper
+    from mlnlite.domains.handover.scene.robots import Robot as Robot
+    from mlnlite.domains.handover.scene.robots import read_robot as read_robot
+    from mlnlite.domains.handover.scene.scene import Layout as Layout
+    from mlnlite.domains.handover.scene.scene import Scene as Scene
+    from mlnlite.domains.handover.scene.scene import make_scene as make_scene
+    from mlnlite.domains.handover.search.checks import Check as Check
+    from mlnlite.domains.handover.search.checks import five_checks as five_checks
+    from mlnlite.domains.handover.search.checks import violations as violations
+    from mlnlite.domains.handover.search.costs import Limits as Limits
+    from mlnlite.domains.handover.search.costs import appropriateness as appropriateness
+    from mlnlite.domains.handover.search.costs import reachability as reachability
+    from mlnlite.domains.handover.search.costs import safety as safety
+    from mlnlite.domains.handover.search.fields import Options as Options
+    from mlnlite.domains.handover.search.fields import cost_field as cost_field
+    from mlnlite.domains.handover.search.hierarchical import Configuration as Configuration
+    from mlnlite.domains.handover.search.hierarchical import Handover as Handover
+    from mlnlite.domains.handover.search.hierarchical import optimise as optimise
+    from mlnlite.domains.handover.search.hierarchical import require as require
+    from mlnlite.domains.handover.search.methods import hand_over as hand_over
 
 _HOMES = {
-    "checks": "Check five_checks violations",
-    "costs": "Limits appropriateness reachability safety",
-    "effort": "Effort effort_at effort_of reachable_set",
-    "fields": "Options cost_field",
-    "grasps": "sample_grasps",
-    "ik": "damped_least_squares",
+    "search.checks": "Check five_checks violations",
+    "search.costs": "Limits appropriateness reachability safety",
+    "scene.effort": "Effort effort_at effort_of reachable_set",
+    "search.fields": "Options cost_field",
+    "scene.grasps": "sample_grasps",
+    "kinematics.ik": "damped_least_squares",
     "instances.generate": "facts_of generate",
     "knowledge.advise": "Advice advice_text advise",
     "knowledge.ask": "Answer Knowledge ask certify explain open_knowledge read_learnt",
     "knowledge.train": "train write_knowledge",
     "knowledge.words": "read_knowledge",
-    "methods": "hand_over",
-    "mobility": "MobilityLevel read_levels",
-    "objects": "HandoverObject object_names read_object",
-    "search": "Configuration Handover optimise require",
-    "pose": "Pose",
-    "receiver": "Body Receiver read_receiver",
-    "robots": "Gripper Robot read_robot",
-    "scene": "Layout Scene make_scene",
+    "search.methods": "hand_over",
+    "scene.mobility": "MobilityLevel read_levels",
+    "scene.objects": "HandoverObject object_names read_object",
+    "search.hierarchical": "Configuration Handover optimise require",
+    "kinematics.pose": "Pose",
+    "scene.receiver": "Body Receiver read_receiver",
+    "scene.robots": "Gripper Robot read_robot",
+    "scene.scene": "Layout Scene make_scene",
 }
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split()}
 _PARTS = (
@@ -121,7 +121,7 @@ def __dir__() -> list[str]:
 
 
 def _commands() -> click.Group:
-    from mlnlite.domains.handover.cli import handover
+    from mlnlite.domains.handover.cli.commands import handover
 
     return handover
 

@@ -81,7 +81,7 @@ def picture(send):
 
 if __name__ == "__main__":
     from mlnlite.domains.handover import make_scene
-    from mlnlite.domains.handover.viewer import open_view
+    from mlnlite.domains.handover.show.viewer import open_view
 
     server = open_view(make_scene("mug", "to_pour", "L-M"), port=8799)
     with page("http://127.0.0.1:8799") as send:

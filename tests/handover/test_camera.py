@@ -11,7 +11,7 @@ import mlnlite as ml
 from mlnlite.domains.handover.execution.camera import PALM, Camera, CameraEyes, Frame, first_of, mediapipe_landmarks
 from mlnlite.domains.handover.execution.machine import Job, execute
 from mlnlite.domains.handover.execution.simulate import Case, SimulatedArm, scene_at
-from mlnlite.domains.handover.pose import Pose, inverse, transform_points
+from mlnlite.domains.handover.kinematics.pose import Pose, inverse, transform_points
 
 SHAPE = (480, 640)
 # 2 m ahead of the person, looking back at them: right is +y, down is -z, ahead is -x

@@ -130,7 +130,7 @@ def test_a_missing_package_says_what_to_install(monkeypatch):
 
     monkeypatch.setattr(package, "import_module", absent)
     with pytest.raises(MissingPart, match="pip install"):
-        package.load("robots")
+        package.load("scene.robots")
 
 
 def test_public_names_survive_the_import_of_their_modules():

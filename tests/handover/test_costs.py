@@ -5,9 +5,9 @@ import pytest
 
 pytest.importorskip("pinocchio")
 
-from mlnlite.domains.handover.costs import Points, appropriateness, distances, reachability, safety
-from mlnlite.domains.handover.pose import Pose, compose, inverse, pose_at, rotation_about, transform_points
-from mlnlite.domains.handover.voxels import VoxelMap, presenting_rotations, voxel_centres
+from mlnlite.domains.handover.kinematics.pose import Pose, compose, inverse, pose_at, rotation_about, transform_points
+from mlnlite.domains.handover.scene.voxels import VoxelMap, presenting_rotations, voxel_centres
+from mlnlite.domains.handover.search.costs import Points, appropriateness, distances, reachability, safety
 
 KINDS = ["point", "surface"]
 

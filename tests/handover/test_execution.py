@@ -27,8 +27,8 @@ from mlnlite.domains.handover.execution.simulate import (
 )
 from mlnlite.domains.handover.execution.sockets import Sight
 from mlnlite.domains.handover.execution.tracks import SCRIPTS, Eyes, Track, at, limited, read_track, seen
-from mlnlite.domains.handover.figures import joint_origins
-from mlnlite.domains.handover.pose import transform_points
+from mlnlite.domains.handover.kinematics.pose import transform_points
+from mlnlite.domains.handover.show.figures import joint_origins
 from tests.handover import browser
 
 

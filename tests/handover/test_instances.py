@@ -31,7 +31,7 @@ from mlnlite.domains.handover.instances.poses import (
 from mlnlite.domains.handover.instances.write import read_rows, write_db, write_rows, write_templates
 from mlnlite.domains.handover.knowledge.train import train
 from mlnlite.domains.handover.knowledge.words import read_knowledge
-from mlnlite.domains.handover.objects import object_names, read_object
+from mlnlite.domains.handover.scene.objects import object_names, read_object
 from mlnlite.domains.handover.study.preferences import published
 
 DATA = Path(__file__).parents[3] / "shared" / "data"

@@ -8,11 +8,11 @@ import pytest
 
 pin = pytest.importorskip("pinocchio")
 
-from mlnlite.domains.handover.chain import reach_bound, tool_poses  # noqa: E402
-from mlnlite.domains.handover.ik import Tolerance, damped_least_squares  # noqa: E402
-from mlnlite.domains.handover.ik_kernel import forward, solve  # noqa: E402
-from mlnlite.domains.handover.pose import angle_between  # noqa: E402
-from mlnlite.domains.handover.robots import read_robot  # noqa: E402
+from mlnlite.domains.handover.kinematics.chain import reach_bound, tool_poses  # noqa: E402
+from mlnlite.domains.handover.kinematics.ik import Tolerance, damped_least_squares  # noqa: E402
+from mlnlite.domains.handover.kinematics.ik_kernel import forward, solve  # noqa: E402
+from mlnlite.domains.handover.kinematics.pose import angle_between  # noqa: E402
+from mlnlite.domains.handover.scene.robots import read_robot  # noqa: E402
 
 spec = importlib.util.spec_from_file_location("ik_twin", Path(__file__).with_name("ik_twin.py"))
 twin = importlib.util.module_from_spec(spec)
@@ -174,7 +174,7 @@ def test_a_refused_solution_leads_to_another():
 
 def test_pink_reaches_the_same_poses_another_way():
     pytest.importorskip("pink")
-    from mlnlite.domains.handover.ik_pink import pink_solver
+    from mlnlite.domains.handover.scene.ik_pink import pink_solver
 
     robot = read_robot("pr2")
     solver = pink_solver(robot)

@@ -19,8 +19,8 @@ from mlnlite.domains.handover.knowledge.facts import databases_text, gathered_te
 from mlnlite.domains.handover.knowledge.reasons import said
 from mlnlite.domains.handover.knowledge.train import train, write_knowledge
 from mlnlite.domains.handover.knowledge.words import ASKED, VARIANTS, read_knowledge, role_of, roles_table
-from mlnlite.domains.handover.objects import object_names, read_object
-from mlnlite.domains.handover.scene import make_scene
+from mlnlite.domains.handover.scene.objects import object_names, read_object
+from mlnlite.domains.handover.scene.scene import make_scene
 
 
 @pytest.fixture(scope="module")

@@ -8,16 +8,16 @@ pytest.importorskip("pinocchio")
 import trimesh
 
 from mlnlite import MlnError
-from mlnlite.domains.handover import objects as catalogue
-from mlnlite.domains.handover.geometry import is_hidden
-from mlnlite.domains.handover.grasps import FRICTION, sample_grasps
-from mlnlite.domains.handover.mobility import read_level, read_levels
-from mlnlite.domains.handover.objects import object_names, read_object, region_centre, region_of, region_points
-from mlnlite.domains.handover.receiver import Body, read_receiver
-from mlnlite.domains.handover.robots import Gripper, read_robot
-from mlnlite.domains.handover.scene import Layout, make_scene
-from mlnlite.domains.handover.search import optimise, require
-from mlnlite.domains.handover.voxels import VoxelMap
+from mlnlite.domains.handover.scene import objects as catalogue
+from mlnlite.domains.handover.scene.geometry import is_hidden
+from mlnlite.domains.handover.scene.grasps import FRICTION, sample_grasps
+from mlnlite.domains.handover.scene.mobility import read_level, read_levels
+from mlnlite.domains.handover.scene.objects import object_names, read_object, region_centre, region_of, region_points
+from mlnlite.domains.handover.scene.receiver import Body, read_receiver
+from mlnlite.domains.handover.scene.robots import Gripper, read_robot
+from mlnlite.domains.handover.scene.scene import Layout, make_scene
+from mlnlite.domains.handover.scene.voxels import VoxelMap
+from mlnlite.domains.handover.search.hierarchical import optimise, require
 
 KNOWN = {"shoe", "stapler", "camera", "bowl", "plate", "sunglasses", "toothbrush", "marker", "flashlight", "glass",
          "book", "bottle", "comb", "phone", "remote"}  # fmt: skip

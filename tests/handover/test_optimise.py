@@ -11,17 +11,17 @@ import pytest
 pytest.importorskip("pinocchio")
 
 from mlnlite import MlnError
-from mlnlite.domains.handover.checks import CHECKS, five_checks, receiver_effort, violations
-from mlnlite.domains.handover.collision import clearance, is_free, touching
-from mlnlite.domains.handover.costs import Limits
-from mlnlite.domains.handover.feasibility import default_solver
-from mlnlite.domains.handover.fields import Options
-from mlnlite.domains.handover.methods import METHODS, hand_over
-from mlnlite.domains.handover.objects import object_names, read_object
-from mlnlite.domains.handover.pose import pose_at
-from mlnlite.domains.handover.receiver import Body, read_receiver
-from mlnlite.domains.handover.scene import Layout, make_scene
-from mlnlite.domains.handover.search import optimise, require
+from mlnlite.domains.handover.kinematics.pose import pose_at
+from mlnlite.domains.handover.scene.collision import clearance, is_free, touching
+from mlnlite.domains.handover.scene.objects import object_names, read_object
+from mlnlite.domains.handover.scene.receiver import Body, read_receiver
+from mlnlite.domains.handover.scene.scene import Layout, make_scene
+from mlnlite.domains.handover.search.checks import CHECKS, five_checks, receiver_effort, violations
+from mlnlite.domains.handover.search.costs import Limits
+from mlnlite.domains.handover.search.feasibility import default_solver
+from mlnlite.domains.handover.search.fields import Options
+from mlnlite.domains.handover.search.hierarchical import optimise, require
+from mlnlite.domains.handover.search.methods import METHODS, hand_over
 
 LEVELS = ("H", "H-M", "L-M", "L")
 SMALL = Options(orientations=4, grasps=2, ik_calls=10**6)
@@ -124,7 +124,7 @@ def test_one_optimisation_is_quick_enough():
 
 def test_another_solver_can_be_plugged_in():
     pytest.importorskip("pink")
-    from mlnlite.domains.handover.ik_pink import pink_solver
+    from mlnlite.domains.handover.scene.ik_pink import pink_solver
 
     scene = make_scene("marker", "to_write", "L-M")
     options = Options(solver=pink_solver(scene.robot))
@@ -134,7 +134,8 @@ def test_another_solver_can_be_plugged_in():
 
 
 SCRIPT = """
-from mlnlite.domains.handover import make_scene, hand_over
+from mlnlite.domains.handover import make_scene
+from mlnlite.domains.handover import hand_over
 for robot in ("pr2", "panda"):
     for method in ("A", "B", "ours"):
         found = hand_over(make_scene("mug", "to_pour", "L-M", robot), method).configuration
@@ -244,7 +245,7 @@ def test_five_checks_pass_and_can_fail():
     assert not five_checks(scene, near)[4].passed
     assert "the tool is not at the grasp" in violations(scene, near)
     arbitrary = hand_over(scene, "A", seed=3).configuration
-    from mlnlite.domains.handover.grasps import sample_grasps
+    from mlnlite.domains.handover.scene.grasps import sample_grasps
 
     on_handle = int(
         np.flatnonzero((sample_grasps(scene.thing, scene.robot.gripper).labels == scene.region).all(axis=1))[0]

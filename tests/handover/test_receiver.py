@@ -7,7 +7,7 @@ import pytest
 
 pin = pytest.importorskip("pinocchio")
 
-from mlnlite.domains.handover.effort import (  # noqa: E402
+from mlnlite.domains.handover.scene.effort import (  # noqa: E402
     GRAVITY,
     easiest_posture,
     effort_at,
@@ -15,8 +15,8 @@ from mlnlite.domains.handover.effort import (  # noqa: E402
     holding_torque,
     reachable_set,
 )
-from mlnlite.domains.handover.mobility import read_levels  # noqa: E402
-from mlnlite.domains.handover.receiver import Body, frame_pose, read_receiver  # noqa: E402
+from mlnlite.domains.handover.scene.mobility import read_levels  # noqa: E402
+from mlnlite.domains.handover.scene.receiver import Body, frame_pose, read_receiver  # noqa: E402
 
 LEVELS = ("H", "H-M", "L-M", "L")
 

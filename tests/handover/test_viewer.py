@@ -10,7 +10,7 @@ pytest.importorskip("pinocchio")
 pytest.importorskip("viser")
 
 from mlnlite.domains.handover import make_scene
-from mlnlite.domains.handover.viewer import open_view, rescaled, serve, summary
+from mlnlite.domains.handover.show.viewer import open_view, rescaled, serve, summary
 from tests.handover import browser
 
 

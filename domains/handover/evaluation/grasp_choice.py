@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from mlnlite.domains.handover.costs import appropriateness
-from mlnlite.domains.handover.grasps import sample_grasps
-from mlnlite.domains.handover.objects import HandoverObject, region_of, region_points
-from mlnlite.domains.handover.robots import Gripper
+from mlnlite.domains.handover.scene.grasps import sample_grasps
+from mlnlite.domains.handover.scene.objects import HandoverObject, region_of, region_points
+from mlnlite.domains.handover.scene.robots import Gripper
+from mlnlite.domains.handover.search.costs import appropriateness
 from mlnlite.domains.handover.study.analysis import holm
 
 N_GRASPS = 20

@@ -19,11 +19,11 @@ import mlnlite as ml
 from mlnlite.domains.handover.evaluation.models import answer_all
 from mlnlite.domains.handover.instances.generate import Instance, facts_of
 from mlnlite.domains.handover.instances.poses import Cell, MeanPose, Placed, quaternion_angles, templates
+from mlnlite.domains.handover.kinematics.pose import FloatArray
 from mlnlite.domains.handover.knowledge.facts import level_facts, object_facts
 from mlnlite.domains.handover.knowledge.train import train
 from mlnlite.domains.handover.knowledge.words import METHODS, method_name, read_knowledge
-from mlnlite.domains.handover.objects import object_names, read_object
-from mlnlite.domains.handover.pose import FloatArray
+from mlnlite.domains.handover.scene.objects import object_names, read_object
 from mlnlite.domains.handover.study.preferences import published
 
 PAPER_TEST = ("shoe", "stapler", "camera", "bowl", "plate", "sunglasses", "toothbrush", "marker", "flashlight", "glass")

@@ -22,7 +22,7 @@ from mlnlite.domains.handover.evaluation.protocol import (
 from mlnlite.domains.handover.instances.generate import Instance, facts_of
 from mlnlite.domains.handover.knowledge.train import train
 from mlnlite.domains.handover.knowledge.words import FOLDER, read_knowledge
-from mlnlite.domains.handover.objects import SHAPES
+from mlnlite.domains.handover.scene.objects import SHAPES
 from mlnlite.domains.handover.study.preferences import bayes_ceiling, published
 
 _INTRO = """22 objects train, 10 test. Mean over splits and the middle 95 % of them; the last line is one split, the

@@ -10,11 +10,11 @@ from time import process_time
 
 import numpy as np
 
-from mlnlite.domains.handover.checks import CHECKS, five_checks, kept_distances, receiver_effort
-from mlnlite.domains.handover.fields import Options
-from mlnlite.domains.handover.methods import hand_over
-from mlnlite.domains.handover.mobility import read_levels
-from mlnlite.domains.handover.scene import Scene, make_scene
+from mlnlite.domains.handover.scene.mobility import read_levels
+from mlnlite.domains.handover.scene.scene import Scene, make_scene
+from mlnlite.domains.handover.search.checks import CHECKS, five_checks, kept_distances, receiver_effort
+from mlnlite.domains.handover.search.fields import Options
+from mlnlite.domains.handover.search.methods import hand_over
 
 VARIANTS: dict[str, tuple[str, Options]] = {
     "A": ("A", Options()),

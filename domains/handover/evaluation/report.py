@@ -17,11 +17,11 @@ from mlnlite.domains.handover.evaluation.protocol_tables import ablation_of_role
 from mlnlite.domains.handover.evaluation.published import PublishedRow, read_published
 from mlnlite.domains.handover.evaluation.quality import measure, quality_section
 from mlnlite.domains.handover.evaluation.real import HeldOut, held_out
-from mlnlite.domains.handover.figures import save
 from mlnlite.domains.handover.instances.generate import LABELS, generate
 from mlnlite.domains.handover.instances.poses import Cell, Placed, all_cells, place_all
-from mlnlite.domains.handover.mobility import read_levels
-from mlnlite.domains.handover.objects import object_names, read_object
+from mlnlite.domains.handover.scene.mobility import read_levels
+from mlnlite.domains.handover.scene.objects import object_names, read_object
+from mlnlite.domains.handover.show.figures import save
 
 
 @dataclass(frozen=True, slots=True)

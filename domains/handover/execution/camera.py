@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import mlnlite as ml
 from mlnlite.domains.handover.execution.sockets import Sight
-from mlnlite.domains.handover.pose import FloatArray, Pose, transform_points
+from mlnlite.domains.handover.kinematics.pose import FloatArray, Pose, transform_points
 
 Image = NDArray[np.uint8]
 Landmarks = Callable[[Image], "FloatArray | None"]

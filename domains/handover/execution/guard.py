@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from mlnlite.domains.handover.costs import Limits
 from mlnlite.domains.handover.execution.sockets import Sight
-from mlnlite.domains.handover.pose import FloatArray, Pose, inverse, transform_points
-from mlnlite.domains.handover.robots import Robot
-from mlnlite.domains.handover.scene import Scene
+from mlnlite.domains.handover.kinematics.pose import FloatArray, Pose, inverse, transform_points
+from mlnlite.domains.handover.scene.robots import Robot
+from mlnlite.domains.handover.scene.scene import Scene
+from mlnlite.domains.handover.search.costs import Limits
 
 LINK = 0.07
 """Radius that encloses the robot's links [m]."""

@@ -16,8 +16,8 @@ import mlnlite as ml
 from mlnlite.domains.handover.execution.guard import Rules, Shape, clearance, may_move
 from mlnlite.domains.handover.execution.planning import Plan, make_plan
 from mlnlite.domains.handover.execution.sockets import Arm, Perception, Sight
-from mlnlite.domains.handover.pose import FloatArray
-from mlnlite.domains.handover.scene import Scene
+from mlnlite.domains.handover.kinematics.pose import FloatArray
+from mlnlite.domains.handover.scene.scene import Scene
 
 STATES = ("perceive", "infer", "plan", "grasp", "approach", "hold", "release", "abort", "done", "aborted")
 Inference = Callable[[], str]

@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mlnlite.domains.handover.collision import hold, is_free
-from mlnlite.domains.handover.costs import Limits
 from mlnlite.domains.handover.execution.guard import SLACK, Rules, Shape, clearance, shape_of
 from mlnlite.domains.handover.execution.sockets import Sight
-from mlnlite.domains.handover.feasibility import attempt, human_grasp
-from mlnlite.domains.handover.fields import Options, cost_field
-from mlnlite.domains.handover.grasps import GraspSet, sample_grasps
-from mlnlite.domains.handover.methods import hand_over
-from mlnlite.domains.handover.plan import plan_path
-from mlnlite.domains.handover.pose import FloatArray, Pose
-from mlnlite.domains.handover.scene import Scene
+from mlnlite.domains.handover.kinematics.plan import plan_path
+from mlnlite.domains.handover.kinematics.pose import FloatArray, Pose
+from mlnlite.domains.handover.scene.collision import hold, is_free
+from mlnlite.domains.handover.scene.grasps import GraspSet, sample_grasps
+from mlnlite.domains.handover.scene.scene import Scene
+from mlnlite.domains.handover.search.costs import Limits
+from mlnlite.domains.handover.search.feasibility import attempt, human_grasp
+from mlnlite.domains.handover.search.fields import Options, cost_field
+from mlnlite.domains.handover.search.methods import hand_over
 
 MARGIN = 0.03
 """The offer keeps so much more than the safety distance, so that a hand at rest does not stop the last step [m]."""

@@ -13,10 +13,17 @@ import viser
 
 import mlnlite as ml
 from mlnlite.domains.handover.execution.machine import Moment, Run, Timing
-from mlnlite.domains.handover.pose import FloatArray, Pose, compose, inverse, pose_from_matrix, transform_points
-from mlnlite.domains.handover.scene import Scene
+from mlnlite.domains.handover.kinematics.pose import (
+    FloatArray,
+    Pose,
+    compose,
+    inverse,
+    pose_from_matrix,
+    transform_points,
+)
+from mlnlite.domains.handover.scene.scene import Scene
+from mlnlite.domains.handover.show.viewer import CAMERA, STEEL, THING, draw_receiver
 from mlnlite.domains.handover.tables import choose
-from mlnlite.domains.handover.viewer import CAMERA, STEEL, THING, draw_receiver
 
 _EVERY = 4
 """Steps per frame."""

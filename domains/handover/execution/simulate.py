@@ -17,11 +17,11 @@ from mlnlite.domains.handover.execution.guard import Rules, Shape, clearance
 from mlnlite.domains.handover.execution.machine import Job, Run, Timing, execute
 from mlnlite.domains.handover.execution.sockets import Sight
 from mlnlite.domains.handover.execution.tracks import SCRIPTS, Eyes, Script, Track, at, scripted, seen
-from mlnlite.domains.handover.objects import object_names, read_object
-from mlnlite.domains.handover.pose import FloatArray
-from mlnlite.domains.handover.receiver import read_receiver
-from mlnlite.domains.handover.robots import read_robot
-from mlnlite.domains.handover.scene import Layout, Scene, make_scene
+from mlnlite.domains.handover.kinematics.pose import FloatArray
+from mlnlite.domains.handover.scene.objects import object_names, read_object
+from mlnlite.domains.handover.scene.receiver import read_receiver
+from mlnlite.domains.handover.scene.robots import read_robot
+from mlnlite.domains.handover.scene.scene import Layout, Scene, make_scene
 
 COARSE = Layout(counts=(9, 9, 9), step=0.05)
 """A map of the same extent as the default one, for planning while the person waits."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from mlnlite.domains.handover.pose import FloatArray
+from mlnlite.domains.handover.kinematics.pose import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

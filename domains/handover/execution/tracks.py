@@ -15,7 +15,7 @@ import numpy as np
 
 import mlnlite as ml
 from mlnlite.domains.handover.execution.sockets import Sight
-from mlnlite.domains.handover.pose import FloatArray, locked
+from mlnlite.domains.handover.kinematics.pose import FloatArray, locked
 
 Script = Literal["still", "drift", "nervous", "lunge", "withdraw"]
 SCRIPTS: tuple[Script, ...] = ("still", "drift", "nervous", "lunge", "withdraw")

@@ -16,7 +16,7 @@ import numpy as np
 
 from mlnlite.domains.handover.knowledge.facts import Fact, label_facts, level_facts, object_facts
 from mlnlite.domains.handover.knowledge.words import METHODS
-from mlnlite.domains.handover.objects import HandoverObject, object_names, read_object, region_of
+from mlnlite.domains.handover.scene.objects import HandoverObject, object_names, read_object, region_of
 from mlnlite.domains.handover.study.preferences import Preferences, level_shares, published, shares
 from mlnlite.domains.handover.tables import choose
 

@@ -14,11 +14,11 @@ from itertools import groupby
 import numpy as np
 
 from mlnlite.domains.handover.instances.generate import Instance
-from mlnlite.domains.handover.methods import hand_over
-from mlnlite.domains.handover.objects import HandoverObject, read_object
-from mlnlite.domains.handover.pose import FloatArray, Pose, compose, inverse, locked
-from mlnlite.domains.handover.scene import make_scene
-from mlnlite.domains.handover.search import Configuration
+from mlnlite.domains.handover.kinematics.pose import FloatArray, Pose, compose, inverse, locked
+from mlnlite.domains.handover.scene.objects import HandoverObject, read_object
+from mlnlite.domains.handover.scene.scene import make_scene
+from mlnlite.domains.handover.search.hierarchical import Configuration
+from mlnlite.domains.handover.search.methods import hand_over
 
 
 @dataclass(frozen=True, slots=True)

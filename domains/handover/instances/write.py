@@ -13,7 +13,7 @@ from mlnlite.domains.handover.instances.generate import Instance, facts_of
 from mlnlite.domains.handover.instances.poses import Cell, MeanPose, Placed, cell_of
 from mlnlite.domains.handover.knowledge.facts import databases_text, kept
 from mlnlite.domains.handover.knowledge.words import LEVELS, METHODS, environments_of, read_knowledge, role_of
-from mlnlite.domains.handover.objects import object_names, read_object
+from mlnlite.domains.handover.scene.objects import object_names, read_object
 from mlnlite.domains.handover.tables import choose
 
 _POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")

@@ -10,10 +10,10 @@ import mlnlite as ml
 from mlnlite.domains.handover.knowledge.ask import Answer, Knowledge, Level, ask, explain, likeliest
 from mlnlite.domains.handover.knowledge.reasons import Reason, said
 from mlnlite.domains.handover.knowledge.words import LEVELS, METHODS, method_name, words_table
-from mlnlite.domains.handover.methods import hand_over
-from mlnlite.domains.handover.objects import HandoverObject
-from mlnlite.domains.handover.scene import Scene
-from mlnlite.domains.handover.search import Configuration, Handover
+from mlnlite.domains.handover.scene.objects import HandoverObject
+from mlnlite.domains.handover.scene.scene import Scene
+from mlnlite.domains.handover.search.hierarchical import Configuration, Handover
+from mlnlite.domains.handover.search.methods import hand_over
 
 
 @dataclass(frozen=True, slots=True, eq=False)

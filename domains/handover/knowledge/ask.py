@@ -21,7 +21,7 @@ from mlnlite.domains.handover.knowledge.words import (
     role_of,
     vocabulary,
 )
-from mlnlite.domains.handover.objects import HandoverObject
+from mlnlite.domains.handover.scene.objects import HandoverObject
 from mlnlite.domains.handover.study.preferences import level_shares, published
 from mlnlite.domains.handover.tables import choose
 

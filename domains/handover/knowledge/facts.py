@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from mlnlite.domains.handover.knowledge.words import environments_of, level_constant, made_for, role_of
-from mlnlite.domains.handover.objects import HandoverObject, region_of
+from mlnlite.domains.handover.scene.objects import HandoverObject, region_of
 
 Fact = tuple[str, ...]
 """A predicate and its constants."""

@@ -13,7 +13,7 @@ from importlib.resources.abc import Traversable
 from typing import Any
 
 import mlnlite as ml
-from mlnlite.domains.handover.objects import AFFORDANCES, CATEGORIES, MATERIALS, SHAPES, TEXTURES, HandoverObject
+from mlnlite.domains.handover.scene.objects import AFFORDANCES, CATEGORIES, MATERIALS, SHAPES, TEXTURES, HandoverObject
 from mlnlite.domains.handover.tables import choose, read_table
 
 FOLDER: Traversable = files("mlnlite.domains.handover.knowledge")

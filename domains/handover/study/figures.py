@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from mlnlite.domains.handover.figures import COLOURS
+from mlnlite.domains.handover.show.figures import COLOURS
 from mlnlite.domains.handover.study.analysis import Consensus, preference_counts
 from mlnlite.domains.handover.study.keywords import KEYWORDS, Share
 from mlnlite.domains.handover.study.preferences import published

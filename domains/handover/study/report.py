@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mlnlite.domains.handover.figures import save
+from mlnlite.domains.handover.show.figures import save
 from mlnlite.domains.handover.study import analysis, figures
 from mlnlite.domains.handover.study.keywords import keyword_shares
 from mlnlite.domains.handover.study.preferences import association, bayes_ceiling, published

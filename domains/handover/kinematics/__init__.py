@@ -1,0 +1,1 @@
+"""Rigid poses, serial arms, inverse kinematics, joint paths."""

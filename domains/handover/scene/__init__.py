@@ -1,0 +1,1 @@
+"""What there is: objects, receiver, robot, and the space around them."""

@@ -1,0 +1,1 @@
+"""Scenes and results as pictures, in the browser, as tables."""
