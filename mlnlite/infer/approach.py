@@ -11,6 +11,7 @@ Sampler = Literal["gibbs", "mcsat", "tempering"]
 MarginalMethod = Literal["auto", "exact", "lifted", "wmc", "gibbs", "mcsat", "tempering", "bp"]
 SAMPLERS: dict[MarginalMethod, Sampler] = {"gibbs": "gibbs", "mcsat": "mcsat", "tempering": "tempering"}
 PATIENCE = 60.0
+BOUNDED = "bounded elimination"
 
 
 @dataclass(frozen=True, slots=True)

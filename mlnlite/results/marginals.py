@@ -107,6 +107,8 @@ class Marginals(Rows[float]):
             return f"{p:.4f}"
         if np.isnan(error):
             return f"about {p:.4f}"
+        if self.methods[i].startswith("bounded"):
+            return f"{p:.4f} within {error:.1e}"
         if (
             self.draws
             and self.r_hat is not None

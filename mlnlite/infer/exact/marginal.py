@@ -12,7 +12,7 @@ from mlnlite.errors import LimitReached
 from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.exact.elimination import log_sum
-from mlnlite.infer.exact.order import TooWide, Tree, plan
+from mlnlite.infer.exact.order import TooWide, plan
 from mlnlite.infer.reduce.fold import fold, unfold
 from mlnlite.infer.reduce.parts import Batch, Division, Part, Summed, batches, divide, identity, parts
 from mlnlite.infer.reduce.peel import (
@@ -39,7 +39,8 @@ class AtomProbabilities:
 
     Attributes:
         probability: shape (n_atoms,), nan for atoms that were not asked for or not answered.
-        exact: shape (n_atoms,), whether the probability is exact to machine precision.
+        slack: shape (n_atoms,), share of all worlds that a probability may leave out: 0 where it is exact to machine
+            precision, nan where nothing is known.
         method: how each was found, empty where it was not.
         log_z: log of the sum of the weights of all worlds of the atoms in the network, the groundings that evidence
             decides included. (Unknown atoms that no factor and no question touches are not in the network; each of
@@ -47,17 +48,26 @@ class AtomProbabilities:
         n_components: how many components the network has.
         largest_table: number of entries of the largest table.
         component: shape (n_atoms,), the component of each atom.
-        wide: numbers of the components past the limit.
+        part_log_z: shape (n_atoms,), log partition function of that component, but for what every world has.
+        wide: numbers of the components past a limit.
+        costly: those past the limit of all tables together only.
     """
 
     probability: Float
-    exact: Bool
+    slack: Float
     method: tuple[str, ...]
     log_z: float
     n_components: int
     largest_table: int
     component: Int32
+    part_log_z: Float
     wide: tuple[int, ...]
+    costly: tuple[int, ...] = ()
+
+    @property
+    def exact(self) -> Bool:
+        """Shape (n_atoms,), whether each probability is exact to machine precision."""
+        return np.asarray(self.slack == 0)
 
 
 @dataclass(slots=True)
@@ -93,6 +103,7 @@ def marginals_of(
     atoms: Int64 | None = None,
     *,
     width_limit: int = WIDTH_LIMIT,
+    in_all: int | None = None,
     too_wide: Literal["raise", "leave"] = "raise",
     rung: Rung | None = None,
 ) -> AtomProbabilities:
@@ -102,6 +113,7 @@ def marginals_of(
         network: what was ground.
         atoms: indices into `network.atoms`; None for all. Components without any of them are not looked at.
         width_limit: largest number of entries of a table.
+        in_all: of all tables of a component together; None for `MEMORY_LIMIT`, or the width limit if that is more.
         too_wide: what to do with components past the limit: raise, or leave their atoms to another method.
         rung: what to try with them before that.
 
@@ -115,7 +127,7 @@ def marginals_of(
     asked[slice(None) if atoms is None else atoms] = True
     wanted = np.zeros(len(potentials.cardinality), np.bool_)
     wanted[network.variable[asked]] = True
-    found = distributions_of(potentials, wanted, wanted if atoms is not None else None, width_limit, rung)
+    found = distributions_of(potentials, wanted, wanted if atoms is not None else None, width_limit, rung, in_all)
     if np.isneginf(found.constant) or np.isneginf(found.log_z).any():
         raise contradiction(network)
     if found.wide and too_wide == "raise":
@@ -124,10 +136,13 @@ def marginals_of(
     label = found.label[network.variable]
     method = tuple(found.method[c] if a else "" for c, a in zip(label.tolist(), asked.tolist(), strict=True))
     wide = tuple(part.component for part, _ in found.wide)
+    costly = tuple(part.component for part, needs in found.wide if needs.in_all)
     log_z = float(found.log_z.sum() + found.constant)
-    exact = ~np.isnan(probability) & ~np.isin(label, found.guessed)
+    slack = np.where(np.isnan(probability) | np.isin(label, found.guessed), np.nan, 0.0)
     n_components = len(np.unique(found.label[: network.n_variables]))
-    return AtomProbabilities(probability, exact, method, log_z, n_components, found.largest_table, label, wide)
+    return AtomProbabilities(
+        probability, slack, method, log_z, n_components, found.largest_table, label, found.log_z[label], wide, costly
+    )
 
 
 def distributions_of(
@@ -136,6 +151,7 @@ def distributions_of(
     needed: Bool | None = None,
     width_limit: int = WIDTH_LIMIT,
     rung: Rung | None = None,
+    in_all: int | None = None,
 ) -> Distributions:
     """Distributions of variables and the log partition function of each component.
 
@@ -145,6 +161,7 @@ def distributions_of(
         needed: shape (n_variables,): only components with one of these are looked at; None for all components.
         width_limit: largest number of entries of a table.
         rung: what to try with components past the limit.
+        in_all: as in `marginals_of`.
     """
     flat, folded = fold(potentials)
     core, leaves = peel(flat, maximise=False)
@@ -164,7 +181,8 @@ def distributions_of(
         own = wanted[part.variables]
         key = identity(part), own.tobytes()
         if key not in known:
-            known[key] = _summed(part, own, width_limit, rung, found)
+            tried = _summed(part, own, (width_limit, in_all or max(MEMORY_LIMIT, width_limit)), found)
+            known[key] = (rung(part, own) or tried) if rung is not None and isinstance(tried, TooWide) else tried
         _enter(part, known[key], found)
     put_back_distributions(leaves, found.start, found.probability)
     unfold(folded, found.start, found.probability)
@@ -203,14 +221,13 @@ def _list_worlds(batch: Batch, found: Distributions) -> None:
     found.largest_table = max(found.largest_table, flat.shape[1])
 
 
-def _summed(part: Part, wanted: Bool, width_limit: int, rung: Rung | None, found: Distributions) -> Summed | TooWide:
-    """Sums over all worlds of a large component."""
-    scopes = [c.scope for c in part.cells]
-    tree = plan(part.cardinality, scopes, width_limit, max(MEMORY_LIMIT, width_limit))
-    if isinstance(tree, Tree):
-        found.largest_table = max(found.largest_table, *tree.sizes)
-        return Summed(*log_sum(tree, part.cardinality, part.cells, wanted), ELIMINATION)
-    return (rung(part, wanted) if rung is not None else None) or tree
+def _summed(part: Part, wanted: Bool, limits: tuple[int, int], found: Distributions) -> Summed | TooWide:
+    """Sums over all worlds of a large component, with tables of so many entries, and so many in all."""
+    tree = plan(part.cardinality, [c.scope for c in part.cells], *limits)
+    if isinstance(tree, TooWide):
+        return tree
+    found.largest_table = max(found.largest_table, *tree.sizes)
+    return Summed(*log_sum(tree, part.cardinality, part.cells, wanted), ELIMINATION)
 
 
 def _enter(part: Part, summed: Summed | TooWide, found: Distributions) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mlnlite.errors import LimitReached, QueryMistake
 from mlnlite.ground.network import Bool, Float, Float32, Int64, Network
-from mlnlite.infer.approach import PATIENCE, SAMPLERS, Approach
+from mlnlite.infer.approach import BOUNDED, PATIENCE, SAMPLERS, Approach
 from mlnlite.infer.deadline import in_seconds
 from mlnlite.infer.exact.formula import formula_probabilities
 from mlnlite.infer.exact.marginal import ELIMINATION, AtomProbabilities, Rung, marginals_of
@@ -21,7 +21,8 @@ from mlnlite.infer.query import atom_numbers
 from mlnlite.infer.reduce.parts import Part, Summed
 from mlnlite.model.formulas import Expression
 
-_SHARE = 6
+_SHARE, _PART, _CHEAP, _FAIR = 6, 10, 1 << 18, 1 << 22
+"""Of the time, for model counting; of the precision, for what is left out; entries of first and second tables."""
 
 
 @dataclass(slots=True)
@@ -87,12 +88,12 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
         everything = np.ones(network.n_variables, np.bool_)
         _enter_sample(network, solution, everything, (atoms, formulas, np.arange(len(solution.methods))), approach)
         return solution
-    network, found = _exactly(network, None if len(asked) == network.n_atoms else asked, approach)
+    network, small, found = _exactly(network, None if len(asked) == network.n_atoms else asked, approach)
     solution.log_z, solution.largest_table = found.log_z, found.largest_table
     solution.n_components = found.n_components
     methods = [found.method[a] for a in atoms.tolist()]
-    _enter(solution, np.arange(len(atoms)), found.probability[atoms], found.exact[atoms], methods)
-    _formulas_exactly(network, solution, found, (len(atoms), formulas), approach)
+    _enter(solution, np.arange(len(atoms)), found.probability[atoms], found.slack[atoms], methods)
+    _formulas_exactly(small, solution, found, (len(atoms), formulas), approach)
     if len(found.wide) > 1:
         atoms = _with_twins(network, found, atoms, np.isnan(solution.probability[: len(atoms)]))
     jobs = sorted(_jobs(found, (atoms, formulas), np.flatnonzero(np.isnan(solution.probability))), key=_n_rows)
@@ -105,24 +106,44 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
     return solution
 
 
-def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple[Network, AtomProbabilities]:
-    """Elimination; where that is too wide, once more with pairs that are complete as counts."""
+def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple[Network, Network, AtomProbabilities]:
+    """Elimination; where that is too wide, with pairs that are complete as counts, and what exclude each other merged.
+
+    Returns:
+        The network for sampling, that for exact answers, and the answers.
+    """
     by_name, limit = _rung_by_name(approach), approach.width_limit
     if by_name is not None:
         found = marginals_of(network, asked, width_limit=1, too_wide="leave", rung=by_name)
         if found.wide:
             raise LimitReached("the time limit was reached", hint="give it more time, or ask for `auto`")
-        return network, found
-    found = marginals_of(network, asked, width_limit=limit, too_wide="leave")
+        return network, network, found
+    found = marginals_of(network, asked, width_limit=limit, in_all=_CHEAP, too_wide="leave")
     if not found.wide:
-        return network, found
+        return network, network, found
     from mlnlite.ground.patterns import with_counts
 
     counted, rung = with_counts(network), _rung_for_wide(network, approach)
+    small, merged = _merged(counted, asked, found, approach, (limit, _FAIR))
     refuses = approach.method == "exact"
-    if refuses or rung is not None or len(counted.counts) > len(network.counts):
-        found = marginals_of(counted, asked, width_limit=limit, too_wide="raise" if refuses else "leave", rung=rung)
-    return counted, found
+    if merged.wide and (refuses or rung is not None or merged.costly or len(counted.counts) > len(network.counts)):
+        found = marginals_of(counted, asked, width_limit=limit, too_wide="leave", rung=rung)
+        small, merged = _merged(counted, asked, found, approach, (limit, None))
+    if refuses and merged.wide:
+        marginals_of(counted, asked, width_limit=limit, rung=rung)
+    return counted, small, merged
+
+
+def _merged(
+    network: Network, asked: Int64 | None, found: AtomProbabilities, approach: Approach, limits: tuple[int, int | None]
+) -> tuple[Network, AtomProbabilities]:
+    """Components that are too wide once more, with atoms that exclude each other as one variable."""
+    from mlnlite.infer.exact.bounded import bounded_marginals
+
+    slack = 0.0 if approach.method == "exact" else approach.precision / _PART
+    wide = np.isin(found.component, found.wide)
+    again = bounded_marginals(network, asked, wide, slack, limits) if found.wide else None
+    return again or (network, found)
 
 
 def _rung_by_name(approach: Approach) -> Rung | None:
@@ -179,12 +200,11 @@ def _nothing_yet(n: int) -> Solution:
     return Solution(probability, error, low, high, r_hat, size, no, [""] * n, mixed=np.ones(n, np.bool_))
 
 
-def _enter(solution: Solution, rows: Int64, probability: Float, exact: Bool, methods: Sequence[str]) -> None:
-    """Writes down answers that are not sampled; nan for those that are not known, and for errors of guesses."""
-    solution.probability[rows], solution.exact[rows] = probability, exact
-    solution.error[rows] = np.where(exact, 0.0, np.nan)
-    for column in (solution.low, solution.high):
-        column[rows] = np.where(exact, probability, np.nan)
+def _enter(solution: Solution, rows: Int64, probability: Float, slack: Float, methods: Sequence[str]) -> None:
+    """Writes down answers that are not sampled, with the share of worlds that each may leave out; nan for unknown."""
+    solution.probability[rows], solution.exact[rows] = probability, slack == 0
+    solution.error[rows], solution.low[rows] = slack, probability * (1 - slack)
+    solution.high[rows] = solution.low[rows] + slack
     for row, method in zip(rows.tolist(), methods, strict=True):
         solution.methods[row] = method
 
@@ -216,7 +236,16 @@ def _formulas_exactly(
         if approach.method in ("exact", "wmc"):
             raise
         return
-    _enter(solution, np.array(rows, np.int64), probability, np.ones(len(rows), np.bool_), [method] * len(rows))
+    slack = np.array([_slack(found, expressions[r - first]) for r in rows])
+    methods = [BOUNDED if s > 0 else method for s in slack.tolist()]
+    _enter(solution, np.array(rows, np.int64), probability, slack, methods)
+
+
+def _slack(found: AtomProbabilities, formula: Expression) -> float:
+    """Share of the worlds that an answer about a formula may leave out."""
+    atoms = np.array(list(atom_numbers(formula)), np.int64)
+    _, first = np.unique(found.component[atoms], return_index=True)
+    return float(found.slack[atoms[first]].sum())
 
 
 def _jobs(

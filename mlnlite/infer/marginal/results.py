@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mlnlite.ground.network import Bool, Float, Int64
+from mlnlite.infer.approach import BOUNDED
 from mlnlite.infer.marginal.bp import LOOPY
 from mlnlite.infer.marginal.ladder import Solution
 from mlnlite.results import Marginals, Statistics
@@ -67,6 +68,8 @@ def status_of(names: Sequence[str], source: Int64, solution: Solution) -> str:
         settled = "" if guessed == {LOOPY} else "; messages did not settle"
         return f"approximate: {LOOPY}, errors not known{settled}"
     error = float(np.nanmax(solution.error[used]))
+    if {solution.methods[s] for s in used[~solution.exact[used]].tolist()} == {BOUNDED}:
+        return f"exact to within {error:.1e}"
     parts = [f"sampled, standard errors up to {error:.4f}"]
     parts += [word for end, word in _ENDINGS.items() if end in solution.endings]
     bad = [i for i in np.flatnonzero(source >= 0).tolist() if not solution.mixed[source[i]]]

@@ -42,8 +42,8 @@ def propagate(cells: Sequence[Cells], cardinality: Int32, constant: float) -> tu
     Returns:
         Cells, at most one for each arity, arity rising, and the new constant (minus infinity: no world is possible).
     """
-    joined = _by_arity(cells)
-    hard = [_pick(c, np.isneginf(c.amount)) for c in joined]
+    grouped = joined(cells)
+    hard = [_pick(c, np.isneginf(c.amount)) for c in grouped]
     start = np.cumsum(cardinality, dtype=np.int64) - cardinality
     forbidden = np.zeros(int(cardinality.sum()), np.bool_)
     for _ in range(_PASSES):
@@ -54,12 +54,12 @@ def propagate(cells: Sequence[Cells], cardinality: Int32, constant: float) -> tu
         forbidden[units] = True
     known = _Known(start, forbidden, _fixed(forbidden, cardinality, start))
     if not forbidden.any():
-        return joined, constant
+        return grouped, constant
     shorter: list[Cells] = [_as_cells(known)]
-    for c in joined:
+    for c in grouped:
         add, gain = _shortened(c, known)
         shorter, constant = [*shorter, *add], constant + gain
-    return _by_arity(shorter), constant
+    return joined(shorter), constant
 
 
 def _fixed(forbidden: Bool, cardinality: Int32, start: Int64) -> Bool:
@@ -102,11 +102,11 @@ def _pick(cells: Cells, which: Bool) -> Cells:
     return Cells(cells.scope[which], cells.value[which], cells.amount[which])
 
 
-def _by_arity(cells: Sequence[Cells]) -> tuple[Cells, ...]:
+def joined(cells: Sequence[Cells]) -> tuple[Cells, ...]:
     """Cells of equal arity joined."""
-    joined = []
+    found = []
     for k in sorted({c.scope.shape[1] for c in cells}):
         same = [c for c in cells if c.scope.shape[1] == k]
         fields = zip(*((c.scope, c.value, c.amount) for c in same), strict=True)
-        joined.append(Cells(*(np.concatenate(f) for f in fields)))
-    return tuple(joined)
+        found.append(Cells(*(np.concatenate(f) for f in fields)))
+    return tuple(found)
