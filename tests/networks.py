@@ -138,6 +138,26 @@ def networks(draw, max_atoms=10, hard=True, with_counts=True):
     return network(blocks, clauses, tables, weights, decided, counts=counts)
 
 
+@st.composite
+def attracting_networks(draw, max_atoms=12):
+    """Random networks of formulas over at most two atoms that attract each other once some are negated; some hard."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n = draw(st.integers(2, max_atoms))
+    positive = [round(float(w), 2) for w in rng.exponential(1.5, 3)]
+    weights, flip = [*positive, *(-w for w in positive), np.inf], rng.random(n) < 0.5
+    clauses = []
+    for _ in range(rng.integers(1, 3 * n)):
+        a, b = rng.choice(n, 2, replace=False)
+        signs, negated = rng.random(2) < 0.5, bool(rng.random() < 0.3)
+        attracts = (signs[0] ^ flip[a]) != (signs[1] ^ flip[b])  # what is lost where the clause is false
+        kind = rng.choice([0, 1, 2, 6] if attracts != negated else [3, 4, 5])
+        literals = [int(x + 1) * (1 if sign else -1) for x, sign in zip((a, b), signs, strict=True)]
+        kind = kind if not negated else kind % 6
+        clauses.append(([(literals, int(kind), int(rng.integers(1, 4)))], negated))
+    clauses += [([_row(rng, n, 1, weights, signed=True)], False) for _ in range(rng.integers(0, n + 1))]
+    return network([("", 1)] * n, clauses, (), weights)
+
+
 def _row(rng, n, k, weights, signed):
     atoms = rng.choice(n, k, replace=False)
     literals = [int(a + 1) * int(rng.choice([-1, 1])) for a in atoms] if signed else [int(a) for a in atoms]

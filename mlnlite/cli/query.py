@@ -236,6 +236,9 @@ def _verify(options: _Options, items: list[str]) -> None:
         raise click.UsageError("--joint is for --task marginal")
     if options["task"] == "map" and options["width_limit"] is not None:
         raise click.UsageError("--width-limit is for --task marginal; --task map takes --time-limit")
+    for name, default in (("precision", 0.005), ("chains", 4)):
+        if options["task"] == "map" and options[name] != default:  # type: ignore[literal-required]
+            raise click.UsageError(f"--{name} is for --task marginal")
     _verify_worlds(options)
     if options["task"] == "marginal" and not items:
         raise QueryMistake("nothing is asked", "name predicates, atoms or formulas: `-q Smokes,Cancer(Ann)`")

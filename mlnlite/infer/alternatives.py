@@ -12,6 +12,7 @@ from mlnlite.ground.network import Network
 from mlnlite.infer.answer import ask, state_of
 from mlnlite.infer.map.kbest import World, best_worlds, diverse_worlds
 from mlnlite.infer.map.ladder import BestWorld
+from mlnlite.infer.map.rungs import verify
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.results import MapState
@@ -49,11 +50,14 @@ def map_states(  # noqa: PLR0913
         worlds only the first one can be.
 
     Raises:
-        QueryMistake: if the query, or a closed world, does not fit the model.
+        QueryMistake: if the query, or a closed world, does not fit the model, or an option means nothing.
         Contradiction: if no world satisfies the evidence and the hard formulas.
     """
     if k < 1:
         raise QueryMistake(f"{k} worlds were asked for", "ask for one at least")
+    if diverse is not None and not 0 <= diverse < np.inf:
+        raise QueryMistake(f"{diverse} is no log-weight to lose", "give a finite number of 0 or more")
+    verify(time_limit=time_limit, seed=seed)
     asked = ask(model, evidence, query, closed_world, engine)
     network, limit = asked.network, time_limit
     if diverse is None:

@@ -21,7 +21,7 @@ from mlnlite.infer.exact.marginal import WIDTH_LIMIT
 from mlnlite.infer.marginal.ladder import solve
 from mlnlite.infer.marginal.results import EVIDENCE, marginals_from
 from mlnlite.infer.query import Question, atom_numbers, question_of
-from mlnlite.infer.score import costs
+from mlnlite.infer.score import cost, counts, n_paid
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
 from mlnlite.model.formulas import AtomRef, Expression
@@ -146,10 +146,13 @@ def map_state(  # noqa: PLR0913
         engine: what runs the grounding plans; by default chosen by size.
 
     Raises:
-        QueryMistake: if the query, or a closed world, does not fit the model.
+        QueryMistake: if the query, or a closed world, does not fit the model, or an option means nothing.
         Contradiction: if no world satisfies the evidence and the hard formulas.
         LimitReached: if there is no answer within the limits.
     """
+    from mlnlite.infer.map.rungs import verify
+
+    verify(method=method, time_limit=time_limit, seed=seed, gap=gap)
     asked = ask(model, evidence, query, closed_world, engine, waits=True)
     return map_state_for(
         asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, gap=gap, margins=margins,
@@ -189,13 +192,13 @@ def map_state_for(  # noqa: PLR0913
         network = lazy.network
     seconds = {"ground": ground_seconds, "infer": perf_counter() - start}
     state = state_of(network, question, best, seconds)
-    index, _ = _locate(network, question.atoms)
     if margins:
+        index, _ = _locate(network, question.atoms)
         state = replace(state, margins=_margins(network, best.truth, index, time_limit))
     if why or explain is not None:
         from mlnlite.infer.why import alternative, paid_groundings, paid_texts
 
-        texts = paid_texts(network, best.truth)
+        texts = paid_texts(network, n_paid(network, counts(network, best.truth)))
         state = replace(state, paid=tuple(paid_groundings(network, best.truth, texts)) if why else ())
         if explain is not None:
             state = replace(state, alternative=alternative(network, best.truth, explain, method, time_limit))
@@ -207,7 +210,8 @@ def state_of(network: Network, question: Question, best: BestWorld, seconds: Map
     index, truth = _locate(network, question.atoms)
     truth[index >= 0] = best.truth[index[index >= 0]]
     methods = [best.component_method[best.component[i]] if i >= 0 else EVIDENCE for i in index.tolist()]
-    total, open_ = costs(network, best.truth)
+    true = counts(network, best.truth)
+    violated = _violations(network, n_paid(network, true))
     return MapState(
         names=tuple(_texts(network.evidence, question.atoms)),
         truth=truth,
@@ -215,10 +219,10 @@ def state_of(network: Network, question: Question, best: BestWorld, seconds: Map
         log_weight=best.log_weight,
         bound=best.bound,
         status=best.status,
-        cost=float(total.sum()),
-        open_cost=float(open_.sum()),
+        cost=cost(network, true),
+        open_cost=float(sum(v.cost for v in violated)),
         gap=best.gap,
-        violated=tuple(_violations(network, best.truth)),
+        violated=violated,
         statistics=Statistics(
             network.n_atoms, network.n_factors, len(best.component_status), best.largest_table, seconds
         ),
@@ -291,9 +295,7 @@ def _locate(network: Network, numbers: Int64) -> tuple[Int64, NDArray[np.bool_]]
     inside = np.minimum(index, max(network.n_atoms - 1, 0))
     unknown = network.atoms[inside] == numbers if network.n_atoms else np.zeros(len(numbers), bool)
     truth = np.zeros(len(numbers), bool)
-    for name, facts in network.evidence.facts.items():
-        true = network.evidence.atom_number(name, facts.arguments[facts.truth])
-        truth |= np.isin(numbers, true)
+    truth[~unknown] = network.evidence.is_true(numbers[~unknown])
     return np.where(unknown, index, -1), truth
 
 
@@ -324,9 +326,9 @@ def _over_network(expression: Expression, network: Network) -> Expression:
     return renamed(simplified(expression, known), places)
 
 
-def _violations(network: Network, truth: NDArray[np.bool_]) -> list[Violation]:
+def _violations(network: Network, paid: Int64) -> tuple[Violation, ...]:
     """The soft formulas that a world pays for, in groundings that evidence leaves open."""
-    from mlnlite.infer.why import n_paid, paid_texts
+    from mlnlite.infer.why import paid_texts
 
-    paid = n_paid(network, truth)
-    return [Violation(text, int(paid[w]), float(network.weights[w])) for w, text in paid_texts(network, truth).items()]
+    texts = paid_texts(network, paid)
+    return tuple(Violation(text, int(paid[w]), float(network.weights[w])) for w, text in texts.items())

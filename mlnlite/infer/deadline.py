@@ -38,6 +38,9 @@ class Deadline:
         return replace(self, end=min(self.end, time.monotonic() + seconds))
 
 
+FOREVER = Deadline()
+
+
 def in_seconds(time_limit: float | None) -> Deadline:
     """A deadline from now; None for never."""
     return Deadline() if time_limit is None else Deadline(time.monotonic() + time_limit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mlnlite.ground.network import Bool, Float, Int64, Network
+from mlnlite.ground.network import Bool, Int64, Network
 from mlnlite.infer.reduce.potentials import check_weights
 
 
@@ -19,35 +19,43 @@ def counts(network: Network, truth: Bool) -> Int64:
         Shape (n_weights,).
     """
     total = network.decided_true.copy()
+    holds = np.concatenate([[False], truth, ~truth[::-1]])  # of each literal: a negative one counts from the end
     for clauses in network.clauses:
-        holds = (truth[np.abs(clauses.literals) - 1] == (clauses.literals > 0)).any(axis=1) != clauses.negated
-        np.add.at(total, clauses.weight[holds], clauses.count[holds])
+        true = np.full(len(clauses.weight), False)
+        for literal in clauses.literals.T:
+            true |= holds[literal]
+        true ^= clauses.negated
+        np.add.at(total, clauses.weight[true], clauses.count[true])
     for tables in network.tables:
-        holds = tables.truth[tuple(truth[tables.atoms].T.astype(np.int64))]
-        np.add.at(total, tables.weight[holds], tables.count[holds])
+        true = tables.truth[tuple(truth[tables.atoms].T.astype(np.int64))]
+        np.add.at(total, tables.weight[true], tables.count[true])
     for group in network.counts:
-        state = (truth[np.abs(group.literals) - 1] == (group.literals > 0)) @ group.steps
+        state = holds[group.literals] @ group.steps
         np.add.at(total, group.weight, group.count * group.true[state])
     return total
 
 
-def costs(network: Network, truth: Bool) -> tuple[Float, Float]:
-    """What a world pays for each soft weight: for false groundings if it is positive, for true ones if it is negative.
+def n_paid(network: Network, true: Int64) -> Int64:
+    """For each soft weight how many open groundings a world pays for: false ones if it is positive, else true ones.
 
     Args:
         network: of which.
-        truth: shape (n_atoms,).
-
-    Returns:
-        Shapes (n_weights,): over all groundings, and over those that evidence leaves open.
+        true: shape (n_weights,), see `counts`.
     """
-    true = counts(network, truth)
-    soft = np.isfinite(network.weights)
-    weight = np.where(soft, np.abs(network.weights), 0.0)
-    positive = network.weights > 0
     open_true = true - network.decided_true
-    total = np.where(positive, network.n_groundings - true, true)
-    return weight * total, weight * np.where(positive, network.n_open - open_true, open_true)
+    soft = np.isfinite(network.weights) & (network.weights != 0)
+    return np.asarray(np.where(network.weights > 0, network.n_open - open_true, open_true) * soft)
+
+
+def cost(network: Network, true: Int64) -> float:
+    """What a world pays for all groundings of soft formulas, those that evidence decides included.
+
+    Args:
+        network: of which.
+        true: shape (n_weights,), see `counts`.
+    """
+    soft = np.where(np.isfinite(network.weights), network.weights, 0.0)
+    return float(np.sum(np.where(soft > 0, soft * (network.n_groundings - true), -soft * true)))
 
 
 def log_weight(network: Network, truth: Bool) -> float:

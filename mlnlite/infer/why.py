@@ -22,24 +22,17 @@ from mlnlite.ground.tables import tables_of
 from mlnlite.infer.map.ladder import map_of
 from mlnlite.infer.map.rungs import Method
 from mlnlite.infer.query import question_of
-from mlnlite.infer.score import counts, log_weight
+from mlnlite.infer.score import counts, log_weight, n_paid
 from mlnlite.model.propositional import cubes
 from mlnlite.model.unparse import row_text
 from mlnlite.results.why import Alternative, PaidGrounding
 
 
-def n_paid(network: Network, truth: Bool) -> Int64:
-    """For each soft weight how many open groundings a world pays for."""
-    true = counts(network, truth) - network.decided_true
-    soft = np.isfinite(network.weights) & (network.weights != 0)
-    return np.asarray(np.where(network.weights > 0, network.n_open - true, true) * soft)
-
-
-def paid_texts(network: Network, truth: Bool) -> dict[int, str]:
-    """The formula of each weight that a world pays for."""
+def paid_texts(network: Network, paid: Int64) -> dict[int, str]:
+    """The formula of each weight that a world pays for, see `score.n_paid`."""
     first = np.searchsorted(network.template, np.arange(len(network.model.templates)))
     texts = {}
-    for w in np.flatnonzero(n_paid(network, truth)).tolist():
+    for w in np.flatnonzero(paid).tolist():
         t = int(network.template[w])
         template = network.model.templates[t]
         texts[w] = row_text(template, network.model, w - int(first[t])) if template.keys else template.text
@@ -124,8 +117,8 @@ def alternative(network: Network, truth: Bool, text: str, method: Method, time_l
     texts = network.evidence.atom_texts(network.atoms[changed])
     order = np.argsort(changed != atom, kind="stable").tolist()
     names = tuple(("" if other[changed[i]] else "!") + texts[i] for i in order)
-    paid = paid_texts(network, truth) | paid_texts(network, other)
-    before, after = (Counter(paid_groundings(network, world, paid)) for world in (truth, other))
+    paid = n_paid(network, counts(network, truth)) + n_paid(network, counts(network, other))
+    before, after = (Counter(paid_groundings(network, w, paid_texts(network, paid))) for w in (truth, other))
     margin = log_weight(network, truth) - best.log_weight
     return Alternative(
         name, margin, best.gap, names, tuple((after - before).elements()), tuple((before - after).elements())
@@ -134,8 +127,6 @@ def alternative(network: Network, truth: Bool, text: str, method: Method, time_l
 
 def _whole(network: Network, left: Network, truth: Bool) -> Bool:
     """A world of all atoms, from one of those that were left open."""
-    whole = np.zeros(network.n_atoms, np.bool_)
-    for name, facts in left.evidence.facts.items():
-        whole |= np.isin(network.atoms, network.evidence.atom_number(name, facts.arguments[facts.truth]))
+    whole = left.evidence.is_true(network.atoms)
     whole[np.searchsorted(network.atoms, left.atoms)] = truth
     return whole

@@ -147,6 +147,18 @@ class Evidence:
             arguments.append(constant)
         return name, tuple(reversed(arguments))
 
+    def is_true(self, numbers: Int64) -> NDArray[np.bool_]:
+        """Whether a single database says that atoms are true, for atom numbers of shape (n,)."""
+        truth = np.zeros(len(numbers), np.bool_)
+        for name, low in self.first_atom().items():
+            mine = np.flatnonzero((numbers >= low) & (numbers < low + prod(self.sizes(name))))
+            if len(mine):
+                facts = self.facts[name]
+                true = self.atom_number(name, facts.arguments[facts.truth])
+                place = np.searchsorted(true, numbers[mine])
+                truth[mine] = np.append(true, -1)[place] == numbers[mine]
+        return truth
+
     def atom_texts(self, numbers: Int64) -> list[str]:
         """Atoms as a user writes them, for rising atom numbers of shape (n,)."""
         texts: list[str] = []

@@ -17,7 +17,7 @@ from mlnlite.infer.map.relaxation import bound_of, solve_program
 from mlnlite.infer.reduce.conjunctions import Cells
 from mlnlite.infer.reduce.dominance import merged
 from mlnlite.infer.reduce.parts import Part, all_gains, value_of
-from mlnlite.infer.score import costs
+from mlnlite.infer.score import cost, counts
 
 
 def frustrated(seed, n, m):
@@ -83,8 +83,8 @@ def test_frustrated_networks_are_proved():
     other = map_of(network, method="ilp", gap=0.02)
     assert other.log_weight <= best.log_weight + 1e-6 <= other.bound + 2e-6
     whole = ml.ground(model, world_evidence(network, best.truth), engine=NumpyEngine())
-    anew = costs(whole, np.zeros(whole.n_atoms, np.bool_))[0].sum()
-    assert anew == pytest.approx(costs(network, best.truth)[0].sum())
+    anew = cost(whole, counts(whole, np.zeros(whole.n_atoms, np.bool_)))
+    assert anew == pytest.approx(cost(network, counts(network, best.truth)))
 
 
 def test_what_is_not_proved_has_a_gap():

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+import mlnlite as ml
+from benchmarks.generators import smokers
 from mlnlite.errors import Contradiction
 from mlnlite.infer.map import ladder as map_module
 from mlnlite.infer.map.ladder import map_of
 from mlnlite.infer.reduce import parts, peel
-from tests.networks import networks, world_weight, worlds
+from tests.networks import attracting_networks, networks, world_weight, worlds
 
 
 def best_weight(net):
@@ -48,3 +50,65 @@ def test_solvers_equal_enumeration(net, method):
     assert answer.log_weight == pytest.approx(expected, abs=1e-9)
     assert answer.status == "optimal"
     assert 0 <= answer.gap < 1e-5
+
+
+@pytest.mark.parametrize("at_once", [0, 10**9])
+@pytest.mark.parametrize("method", ["auto", "mincut"])
+@settings(max_examples=60, deadline=None)
+@given(net=attracting_networks())
+def test_minimum_cuts_equal_enumeration(net, method, at_once):
+    expected = best_weight(net)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(map_module, "_AT_ONCE", at_once)
+        if np.isneginf(expected):
+            with pytest.raises(Contradiction):
+                map_of(net, method=method)
+            return
+        answer = map_of(net, method=method)
+    assert answer.log_weight == pytest.approx(expected, abs=1e-9)
+    assert answer.bound == pytest.approx(expected, abs=1e-6)
+    assert answer.status == "optimal"
+    assert len(answer.component_gap) == len(np.unique(answer.component))
+
+
+def test_an_interrupted_cut_has_a_bound(monkeypatch):
+    model, evidence = smokers(2000)
+    net = ml.ground(model, evidence)
+    monkeypatch.setattr(map_module, "_AT_ONCE", 0)
+    best = map_of(net)
+    monkeypatch.setattr("mlnlite.infer.map.mincut._PATHS", 1)
+    early = map_of(net, time_limit=1e-9)
+    assert best.methods == {"mincut": len(best.component_status)}
+    assert early.status == "feasible"
+    assert early.log_weight <= best.log_weight <= early.bound + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ({"method": "mincuts"}, "no method mincuts.*\n.*mincut"),
+        ({"method": "gibbs"}, "no method gibbs"),
+        ({"gap": -0.1}, "gap of -0.1"),
+        ({"gap": float("nan")}, "gap of nan"),
+        ({"time_limit": 0}, "time limit of 0 s"),
+        ({"time_limit": float("nan")}, "time limit of nan s"),
+        ({"seed": -1}, "-1 is no seed"),
+        ({"seed": 2**31}, "is no seed"),
+    ],
+)
+def test_options_that_mean_nothing_are_refused_however_easy_the_question(option, message):
+    model = ml.model_from_text("P(a)\na = {A, B}\n1 P(x)\n")
+    evidence = ml.evidence_from_text("P(A)\n", model=model)
+    with pytest.raises(ml.QueryMistake, match=message):
+        ml.map_state(model, evidence, **option)
+    if "time_limit" in option or "seed" in option:
+        with pytest.raises(ml.QueryMistake, match=message):
+            ml.map_states(model, evidence, **option)
+
+
+def test_different_worlds_need_a_penalty_that_is_a_number():
+    model = ml.model_from_text("P(a)\na = {A, B}\n1 P(x)\n")
+    evidence = ml.evidence_from_text("P(A)\n", model=model)
+    for penalty in (-1.0, float("nan"), float("inf")):
+        with pytest.raises(ml.QueryMistake, match="no log-weight to lose"):
+            ml.map_states(model, evidence, k=2, diverse=penalty)

@@ -10,7 +10,7 @@ from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.exact.elimination import best_world
 from mlnlite.infer.exact.order import plan
 from mlnlite.infer.map import ilp, maxsat, mincut, relaxation, toulbar2
-from mlnlite.infer.map.flow_kernel import push
+from mlnlite.infer.map.flow_kernel import arcs, greedy, push, seeds
 from mlnlite.infer.map.ladder import map_of
 from mlnlite.infer.map.search import annealing, walksat
 from mlnlite.infer.map.search.annealing_kernel import sweeps
@@ -291,7 +291,8 @@ def test_walks_do_what_their_python_does(monkeypatch):
 def test_flows_do_what_their_python_does(seed, monkeypatch):
     part = attractive(np.random.default_rng(seed), 40, 100)
     compiled = mincut.solve_part(part)
-    monkeypatch.setattr("mlnlite.infer.map.flow_kernel.push", push.py_func)
+    for function in (arcs, greedy, push, seeds):
+        monkeypatch.setattr(f"mlnlite.infer.map.flow_kernel.{function.__name__}", function.py_func)
     plain = mincut.solve_part(part)
     assert compiled.world.tolist() == plain.world.tolist()
     assert plain.optimal

@@ -13,6 +13,7 @@ from mlnlite.ground.network import Bool, Float, Int32, Int64, Network
 from mlnlite.infer.conflict import contradiction
 from mlnlite.infer.exact.elimination import log_sum
 from mlnlite.infer.exact.order import TooWide, plan
+from mlnlite.infer.reduce.conjunctions import starts_of
 from mlnlite.infer.reduce.fold import fold, unfold
 from mlnlite.infer.reduce.parts import Batch, Division, Part, Summed, batches, divide, identity, parts
 from mlnlite.infer.reduce.peel import (
@@ -194,7 +195,7 @@ def distributions_of(
 def _nothing_yet(cardinality: Int32, constant: float, division: Division, gone: Sequence[Gone]) -> Distributions:
     """Distributions to be filled in."""
     n = division.n_components
-    start = np.cumsum(cardinality, dtype=np.int64) - cardinality
+    start = starts_of(cardinality)
     label = put_back_labels(gone, division.label)
     log_z = np.full(n, np.nan)
     log_z[division.label[label != division.label]] = 0.0

@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from mlnlite.ground.network import Bool, Float, Int64
-from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.deadline import FOREVER, Deadline
 from mlnlite.infer.reduce.conjunctions import Cells
 from mlnlite.infer.reduce.costs import with_costs
 from mlnlite.infer.reduce.dominance import merged
@@ -26,7 +26,6 @@ from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains
 ILP = "ilp"
 _ABSOLUTE, _RELATIVE = 1e-6, 1e-9
 _FEWEST = 4
-FOREVER = Deadline()
 
 
 @dataclass(slots=True)

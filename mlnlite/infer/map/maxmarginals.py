@@ -15,7 +15,7 @@ from mlnlite.infer.deadline import in_seconds
 from mlnlite.infer.exact.elimination import combined
 from mlnlite.infer.exact.order import TooWide, Tree, plan
 from mlnlite.infer.map.rungs import Options, answers_of
-from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.conjunctions import Cells, starts_of
 from mlnlite.infer.reduce.narrow import narrowed
 from mlnlite.infer.reduce.parts import Batch, Part, batches, divide, parts, value_of
 from mlnlite.infer.reduce.potentials import potentials_of
@@ -41,7 +41,7 @@ def margins_of(
     wanted = np.zeros(network.n_atoms, np.bool_)
     wanted[slice(None) if atoms is None else atoms] = True
     potentials = potentials_of(network, max_arity=np.inf)
-    start = np.cumsum(potentials.cardinality, dtype=np.int64) - potentials.cardinality
+    start = starts_of(potentials.cardinality)
     gain = np.full(int(potentials.cardinality.sum()), np.nan)
     needed = np.zeros(len(potentials.cardinality), np.bool_)
     needed[network.variable[wanted]] = True

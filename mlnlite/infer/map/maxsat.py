@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.reduce.conjunctions import starts_of
 from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains
 from mlnlite.infer.workers.ask import Ask
 
@@ -32,7 +33,7 @@ def solve_part(part: Part, ask: Ask, deadline: Deadline) -> PartAnswer:
     reply = ask("_rc2_worker", problem, deadline)
     if reply is None or reply["state"] is None:
         return PartAnswer(None, all_gains(part), False, MAXSAT)
-    first = np.cumsum(part.cardinality, dtype=np.int64) - part.cardinality
+    first = starts_of(part.cardinality)
     true = np.zeros(int(part.cardinality.sum()) + 1, np.bool_)
     state = np.array(reply["state"], np.int64)
     true[[x for x in state[state > 0].tolist() if x < len(true)]] = True
@@ -46,7 +47,7 @@ def _problem(part: Part) -> tuple[dict[str, Any], float, float]:
     Value k of a variable is literal `first + k + 1`; a cell that costs is the clause of its negated literals, one that
     pays is a new literal that implies all of its own.
     """
-    first = np.cumsum(part.cardinality, dtype=np.int64) - part.cardinality + 1
+    first = starts_of(part.cardinality) + 1
     amounts = np.concatenate([np.zeros(0), *(c.amount[np.isfinite(c.amount)] for c in part.cells)])
     room = np.floor(np.log10(_LARGEST / max(1.0, float(np.abs(amounts).sum()))))
     scale = 10.0 ** min(_FINEST, int(room))

@@ -8,20 +8,22 @@ Amounts become integers, `amount * scale` rounded; sums are exact, and the bound
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from mlnlite.ground.network import Bool, Float, Int64
-from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.deadline import FOREVER, Deadline
+from mlnlite.infer.reduce.conjunctions import distinct, summed
 from mlnlite.infer.reduce.parts import Part, PartAnswer, value_of
 
 MINCUT = "mincut"
 _DIGITS = 12
-_SAMPLE = 1000
 _LARGEST = 2.0**60
+_CLOSE = 1e-9
+_PATHS = 50_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +37,7 @@ class Quadratic:
         product: shape (m,), even.
         scale: integers stand for that many times the amounts.
         error: what rounding may have changed the difference of two worlds by.
+        close: whether that is next to nothing.
     """
 
     linear: Int64
@@ -43,6 +46,7 @@ class Quadratic:
     product: Int64
     scale: float
     error: float
+    close: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,57 +65,44 @@ class Cut:
 
 
 def quadratic(part: Part) -> Quadratic | None:
-    """A component as a quadratic function; None if it has cells of three literals, blocks or forbidden pairs."""
-    if any(c.scope.shape[1] > 2 for c in part.cells) or (part.cardinality != 2).any():
+    """A component as a quadratic function; None if it has cells of three literals, or blocks.
+
+    What is forbidden costs more than everything else together.
+    """
+    if any(c.scope.shape[1] > 2 for c in part.cells) or (part.cardinality > 2).any():
         return None
     n, amounts = len(part.variables), np.concatenate([np.zeros(0), *(c.amount for c in part.cells)])
-    if not np.isfinite(amounts).all():
-        return None
-    scale = _scale(amounts)
+    soft = np.isfinite(amounts)
+    worth = float(np.abs(amounts[soft]).sum())
+    never = -2 * np.ceil(worth) - 1
+    scale = _scale(np.where(soft, amounts, never))
     linear = np.zeros(n, np.int64)
-    pairs = Cells(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32), np.zeros(0))
+    first = second = product = np.zeros(0, np.int64)
     for c in part.cells:
-        whole = 2 * np.rint(c.amount * scale).astype(np.int64)
+        whole = 2 * np.rint(np.maximum(c.amount, never) * scale).astype(np.int64)
         if c.scope.shape[1] == 1:
             np.add.at(linear, c.scope[:, 0], np.where(c.value[:, 0] == 1, whole, -whole))
-        else:
-            pairs = c
-            for own, other in ((0, 1), (1, 0)):
-                alone = np.where(c.value[:, other] == 0, whole, 0)
-                np.add.at(linear, c.scope[:, own], np.where(c.value[:, own] == 1, alone, -alone))
-    whole = 2 * np.rint(pairs.amount * scale).astype(np.int64)
-    signed = np.where(pairs.value[:, 0] == pairs.value[:, 1], whole, -whole)
-    first, second, product = _summed(pairs.scope, signed, n)
-    error = float(np.abs(np.rint(amounts * scale) / scale - amounts).sum())
-    return Quadratic(linear, first, second, product, scale, error)
+            continue
+        for own, other in ((0, 1), (1, 0)):
+            alone = np.where(c.value[:, other] == 0, whole, 0)
+            np.add.at(linear, c.scope[:, own], np.where(c.value[:, own] == 1, alone, -alone))
+        signed = np.where(c.value[:, 0] == c.value[:, 1], whole, -whole)
+        key, product = summed(c.scope[:, 0].astype(np.int64) * n + c.scope[:, 1], signed)
+        first, second = np.divmod(key[product != 0], n)
+        product = product[product != 0]
+    error = float(np.abs(np.rint(amounts[soft] * scale) / scale - amounts[soft]).sum())
+    return Quadratic(linear, first, second, product, scale, error, error <= _CLOSE * worth)
 
 
 def _scale(amounts: Float) -> float:
     """The smallest power of ten that makes all amounts integers, or the largest one that is safe."""
     room = int(np.floor(np.log10(_LARGEST / max(1.0, 4 * float(np.abs(amounts).sum())))))
+    kinds = distinct(amounts)
     for digits in range(min(room, _DIGITS)):
-        if _are_integers(amounts[:_SAMPLE], digits) and _are_integers(amounts, digits):
+        shifted = kinds * 10.0**digits
+        if (np.abs(shifted - np.rint(shifted)) <= _CLOSE).all():
             return 10.0**digits
     return float(10.0 ** min(room, _DIGITS))
-
-
-def _are_integers(amounts: Float, digits: int) -> bool:
-    """Whether amounts have at most so many decimals."""
-    shifted = amounts * 10.0**digits
-    return bool((np.abs(shifted - np.rint(shifted)) <= 1e-9).all())
-
-
-def _summed(scope: np.ndarray, product: Int64, n: int) -> tuple[Int64, Int64, Int64]:
-    """Each pair once, with the sum of its products; pairs that cancel left out."""
-    key = scope[:, 0].astype(np.int64) * n + scope[:, 1]
-    if (np.diff(key) <= 0).any():
-        order = np.argsort(key, kind="stable")
-        key, product = key[order], product[order]
-        starts = np.flatnonzero(np.diff(key, prepend=-1))
-        key, product = key[starts], np.add.reduceat(product, starts)
-    keep = product != 0
-    first, second = np.divmod(key[keep], n)
-    return first, second, product[keep]
 
 
 def flips(function: Quadratic) -> Bool | None:
@@ -139,47 +130,47 @@ def flipped(function: Quadratic, flip: Bool) -> Quadratic:
     # x = 1 - y: q x_a x_b = q x_a - q x_a y_b, so a flipped end gives its partner the product as a linear term
     np.add.at(linear, a, np.where(flip[b], function.product, 0) * sign[a])
     np.add.at(linear, b, np.where(flip[a], function.product, 0) * sign[b])
-    return Quadratic(linear, a, b, function.product * sign[a] * sign[b], function.scale, function.error)
+    return replace(function, linear=linear, product=function.product * sign[a] * sign[b])
 
 
-def solve_part(part: Part) -> PartAnswer | None:
+def solve_part(part: Part, deadline: Deadline = FOREVER) -> PartAnswer | None:
     """Solves a component, or says by None that it is of another kind.
 
     Args:
         part: the component.
+        deadline: when to stop; what flows by then is the bound.
     """
     function = quadratic(part)
     flip = None if function is None else flips(function)
     if function is None or flip is None:
         return None
-    cut = minimum_cut(flipped(function, flip))
+    cut = minimum_cut(flipped(function, flip), deadline)
     world = (cut.source_side != flip).astype(np.int64)
-    value = value_of(part, world)
-    return PartAnswer(world, value + function.error, cut.flow == cut.capacity, MINCUT)
+    value, proved = value_of(part, world), cut.flow == cut.capacity and function.close
+    if np.isneginf(value):
+        return PartAnswer(None, np.inf, False, MINCUT)
+    missing = (cut.capacity - cut.flow) / (2 * function.scale)
+    return PartAnswer(world, value + missing + function.error, proved, MINCUT)
 
 
-def minimum_cut(function: Quadratic) -> Cut:
+def minimum_cut(function: Quadratic, deadline: Deadline = FOREVER) -> Cut:
     """The world that makes a function with positive products largest: those on the source's side are 1.
 
     `q x_a x_b = q (x_a + x_b) / 2 - q (x_a (1 - x_b) + x_b (1 - x_a)) / 2`: an arc of capacity q / 2 each way.
     """
-    from mlnlite.infer.map.flow_kernel import push
+    from mlnlite.infer.map.flow_kernel import arcs, greedy, push, seeds
 
-    n, half = len(function.linear), function.product // 2
+    half = function.product // 2
     terminal = function.linear.copy()
     np.add.at(terminal, function.first, half)
     np.add.at(terminal, function.second, half)
-    start = np.concatenate([function.first, function.second])
-    order = np.argsort(start, kind="stable")
-    head = np.concatenate([function.second, function.first])[order].astype(np.int32)
-    place = np.empty(len(order), np.int64)
-    place[order] = np.arange(len(order))
-    m = len(half)
-    sister = np.concatenate([place[m:], place[:m]])[order].astype(np.int32)
-    room = np.concatenate([half, half])[order]
-    begin = np.searchsorted(start[order], np.arange(n + 1)).astype(np.int32)
-    flow, side = push(begin, head, sister, room.copy(), terminal.copy())
+    left = terminal.copy()
+    graph = arcs(len(left), function.first, function.second, half)
+    node, *queue, at = seeds(left, greedy(*graph, left))
+    while at[1] and not deadline.is_over:
+        push(*graph, left, node, *queue, at, _PATHS)
+    side = node[:, 0] == 1
     leaves = side[function.first] != side[function.second]
     capacity = int(half[leaves].sum()) + int(terminal[(terminal > 0) & ~side].sum())
     capacity += int(-terminal[(terminal < 0) & side].sum())
-    return Cut(side, capacity, int(flow))
+    return Cut(side, capacity, int(at[3]))

@@ -11,14 +11,13 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from mlnlite.ground.network import Float
-from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.deadline import FOREVER, Deadline
 from mlnlite.infer.map.ilp import Program, model_of, program_of, stop_with, world_of
 from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains, value_of
 
 RELAXATION = "lp"
 _CLOSE, _LOOSE = 1e-7, 1e-4
 _FEWEST, _WORK = 200, 2_000_000_000
-FOREVER = Deadline()
 
 
 def solve_part(part: Part, deadline: Deadline = FOREVER, solver_name: str = "pdlp") -> PartAnswer:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypedDict, get_args
 
-from mlnlite.errors import QueryMistake
+from mlnlite.errors import QueryMistake, did_you_mean
 from mlnlite.ground.network import Int64
 from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.map import ilp, maxsat, mincut, relaxation, toulbar2
@@ -19,6 +19,7 @@ Method = Literal["auto", "ve", "mincut", "ilp", "wcsp", "maxsat", "annealing", "
 METHODS: tuple[Method, ...] = get_args(Method)
 _FEW, _MANY, _TOO_MANY = 400, 20_000, 3_000_000
 _CYCLES_UP_TO = 20_000
+_LARGEST_SEED = 2**31 - 1
 _NODES, _BACKTRACKS, _WORK = 50, (200, 50_000), 10_000_000
 """How much of a rung is a try: nodes of an integer program; backtracks, at least, at most and by number of cells."""
 
@@ -30,6 +31,23 @@ class Search(TypedDict, total=False):
     time_limit: float | None
     seed: int
     gap: float
+
+
+def verify(*, method: str = "auto", time_limit: float | None = None, seed: int = 0, gap: float = 0.0) -> None:
+    """Refuses options of a search that mean nothing, however easy the question.
+
+    Raises:
+        QueryMistake: naming the option.
+    """
+    if method not in METHODS:
+        hint = did_you_mean(method, METHODS) or f"one of {', '.join(METHODS)}"
+        raise QueryMistake(f"there is no method {method} for most probable worlds", hint)
+    if time_limit is not None and not time_limit > 0:
+        raise QueryMistake(f"a time limit of {time_limit} s leaves no time", "give more than 0 s, or no limit")
+    if not gap >= 0:
+        raise QueryMistake(f"a gap of {gap} is no share of a cost", "0 asks for a proof, .01 for one per cent")
+    if not 0 <= seed <= _LARGEST_SEED or int(seed) != seed:
+        raise QueryMistake(f"{seed} is no seed", f"give a whole number from 0 to {_LARGEST_SEED}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +101,8 @@ def _search(part: Part, options: Options, deadline: Deadline, ask: Ask) -> list[
 
 def _is_close(part: Part, answers: list[PartAnswer], gap: float) -> bool:
     """Whether the best world so far costs at most a share more than any other can."""
-    values = [value_of(part, a.world) for a in answers if a.world is not None]
-    if not values or gap <= 0:
+    values = [value_of(part, a.world) for a in answers if a.world is not None] if gap > 0 else []
+    if not values:
         return False
     highest, bound = all_gains(part), min(a.bound for a in answers)
     return bound - max(values) <= gap * (highest - max(values))
@@ -167,12 +185,12 @@ def _single(options: Options, ask: Ask) -> dict[str, list[Rung]]:
     }
 
 
-def _by_mincut(part: Part, _: Deadline, __: list[PartAnswer]) -> PartAnswer | None:
-    return mincut.solve_part(part)
+def _by_mincut(part: Part, deadline: Deadline, _: list[PartAnswer]) -> PartAnswer | None:
+    return mincut.solve_part(part, deadline)
 
 
-def _only_mincut(part: Part, _: Deadline, __: list[PartAnswer]) -> PartAnswer:
-    answer = mincut.solve_part(part)
+def _only_mincut(part: Part, deadline: Deadline, _: list[PartAnswer]) -> PartAnswer:
+    answer = mincut.solve_part(part, deadline)
     if answer is None:
         hint = "try `auto`: it uses minimum cuts where they apply"
         raise QueryMistake("minimum cuts need formulas over pairs of atoms that attract, once some are negated", hint)

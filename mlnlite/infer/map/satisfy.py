@@ -8,6 +8,7 @@ import numpy as np
 from pysat.solvers import Solver
 
 from mlnlite.ground.network import Int64
+from mlnlite.infer.reduce.conjunctions import starts_of
 from mlnlite.infer.reduce.parts import Part
 
 
@@ -20,7 +21,7 @@ def feasible_world(part: Part) -> Int64 | None:
     Returns:
         Shape (n,), or None if there is none.
     """
-    first = np.cumsum(part.cardinality, dtype=np.int64) - part.cardinality + 1
+    first = starts_of(part.cardinality) + 1
     with Solver(name="cadical153") as solver:
         for begin, size in zip(first.tolist(), part.cardinality.tolist(), strict=True):
             solver.add_clause(list(range(begin, begin + size)))

@@ -13,6 +13,7 @@ import numpy as np
 
 from mlnlite.errors import LimitReached
 from mlnlite.ground.network import Bool, Float, Int64
+from mlnlite.infer.reduce.conjunctions import starts_of
 from mlnlite.infer.reduce.fill import Placed, fill
 from mlnlite.infer.reduce.narrow import narrowed
 from mlnlite.infer.reduce.parts import Part, Summed
@@ -52,7 +53,7 @@ def propagate_beliefs(part: Part, wanted: Bool) -> Summed:
         LimitReached: a table is too large.
     """
     part = narrowed(part)
-    start = np.cumsum(part.cardinality, dtype=np.int64) - part.cardinality
+    start = starts_of(part.cardinality)
     own, groups = _groups(part, start)
     owner = np.repeat(np.arange(len(start)), part.cardinality)
     before, change = _normalised(own, start, owner), np.inf

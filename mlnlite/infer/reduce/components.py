@@ -10,6 +10,8 @@ import numpy as np
 from mlnlite.ground.network import Int32, Int64, Network
 
 _FEW = 2000
+_ROW_BITS = 32
+_ROWS = (1 << _ROW_BITS) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +44,13 @@ def labels_of(n_variables: int, scopes: Iterable[Int32]) -> Int32:
     linked = [s for s in scopes if s.shape[1] > 1]
     start = np.concatenate([np.repeat(s[:, 0], s.shape[1] - 1) for s in linked] or [np.zeros(0, np.int32)])
     end = np.concatenate([s[:, 1:].ravel() for s in linked] or [np.zeros(0, np.int32)])
-    labels = _few(n_variables, start, end) if len(start) <= _FEW else _many(n_variables, start, end)
-    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(first))[inverse].astype(np.int32)
+    smallest = _few(n_variables, start, end) if len(start) <= _FEW else _many(n_variables, start, end)
+    number = np.cumsum(smallest == np.arange(n_variables), dtype=np.int32) - np.int32(1)
+    return number[smallest]
 
 
 def _few(n_variables: int, start: Int32, end: Int32) -> Int32:
-    """Some number for each component, link by link; saves the time to load SciPy's graphs."""
+    """The smallest variable of each component, link by link; saves the time to load compiled code."""
     parent = list(range(n_variables))
 
     def root(v: int) -> int:
@@ -57,7 +59,8 @@ def _few(n_variables: int, start: Int32, end: Int32) -> Int32:
         return v
 
     for a, b in zip(start.tolist(), end.tolist(), strict=True):
-        parent[root(a)] = root(b)
+        low, high = sorted((root(a), root(b)))
+        parent[high] = low
     return np.array([root(v) for v in range(n_variables)], np.int32)
 
 
@@ -85,8 +88,8 @@ def rows_by_label(labels: Int32, n_labels: int) -> tuple[Int64, Int64]:
     Returns:
         Shapes (n,) and (n_labels + 1,): rows `order[starts[i] : starts[i + 1]]` have label i, rising.
     """
-    order = np.argsort(labels, kind="stable")
-    return order, np.searchsorted(labels[order], np.arange(n_labels + 1))
+    packed = np.sort(labels.astype(np.int64) << _ROW_BITS | np.arange(len(labels)))  # several times as fast as argsort
+    return packed & _ROWS, np.searchsorted(packed >> _ROW_BITS, np.arange(n_labels + 1))
 
 
 def components_of(network: Network) -> tuple[Component, ...]:

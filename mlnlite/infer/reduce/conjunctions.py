@@ -8,13 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mlnlite.ground.network import Bool, Float, Int32, Int64
 
 MAX_ARITY = 12
 MAX_CELLS = 4096
+_FEW_BITS = 12
+_Number = TypeVar("_Number", np.int64, np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +53,40 @@ class Cells:
     amount: Float
 
 
+def starts_of(cardinality: Int32) -> Int64:
+    """Shape (n_variables,), where the values of each variable start in an array over all values."""
+    return np.cumsum(cardinality, dtype=np.int64) - cardinality
+
+
+def distinct(amount: NDArray[_Number]) -> NDArray[_Number]:
+    """The different numbers of an array of shape (n,), rising; where these are few, sorting is quicker than hashing."""
+    rising = np.sort(amount)
+    new = np.ones(len(rising), np.bool_)
+    new[1:] = rising[1:] != rising[:-1]
+    return rising[new]
+
+
+def summed(key: Int64, amount: NDArray[_Number]) -> tuple[Int64, NDArray[_Number]]:
+    """The distinct keys, rising, and the sum of the amounts of each.
+
+    Args:
+        key: shape (n,), not negative.
+        amount: shape (n,). If it has few different values, these are sorted with the keys, which is fast.
+    """
+    if (np.diff(key) > 0).all():
+        return key, amount
+    kinds = distinct(amount)
+    bits = len(kinds).bit_length()
+    if bits <= _FEW_BITS and int(key.max()).bit_length() + bits < 64:
+        packed = np.sort(key << bits | np.searchsorted(kinds, amount))
+        key, amount = packed >> bits, kinds[packed & ((1 << bits) - 1)]
+    else:
+        order = np.argsort(key)
+        key, amount = key[order], amount[order]
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    return key[first], np.add.reduceat(amount, first)
+
+
 def split_wide(
     rows: Conjunctions, cardinality: Int32, max_arity: float = MAX_ARITY
 ) -> tuple[list[Conjunctions], Int32]:
@@ -66,9 +104,11 @@ def split_wide(
         Conjunctions that mean the same, and the cardinalities of all variables, the auxiliary ones appended.
     """
     k = rows.variable.shape[1]
+    if k <= 2:
+        return [rows], cardinality
     others = np.where(np.isfinite(rows.amount)[:, None], 2, cardinality[rows.variable] - 1)
     choices = np.where(rows.equal | (cardinality[rows.variable] <= 2), 1, others)
-    wide = (k > 2) & ((k > max_arity) | (np.prod(choices, axis=1, dtype=float) > MAX_CELLS))
+    wide = (k > max_arity) | (np.prod(choices, axis=1, dtype=float) > MAX_CELLS)
     if not np.any(wide):
         return [rows], cardinality
     parts = [_pick(rows, ~wide)]

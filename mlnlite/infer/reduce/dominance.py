@@ -11,13 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlnlite.ground.network import Bool, Float, Int64
-from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.ground.network import Bool, Float
+from mlnlite.infer.reduce.conjunctions import Cells, starts_of, summed
 from mlnlite.infer.reduce.potentials import Potentials
 from mlnlite.infer.reduce.propagate import propagate
 
 _PASSES = 50
 _LARGE = 100_000
+_BITS = 62
 
 
 def without_dominated(potentials: Potentials) -> Potentials:
@@ -29,7 +30,7 @@ def without_dominated(potentials: Potentials) -> Potentials:
             return reduced
         few = np.count_nonzero(drop) < len(drop) / 20 and len(drop) > _LARGE
         flat = np.flatnonzero(drop)
-        start = starts_of(reduced)
+        start = starts_of(reduced.cardinality)
         variable = np.searchsorted(start, flat, side="right") - 1
         value = (flat - start[variable]).astype(np.int32)[:, None]
         forbidden = Cells(variable.astype(np.int32)[:, None], value, np.full(len(flat), -np.inf))
@@ -40,14 +41,9 @@ def without_dominated(potentials: Potentials) -> Potentials:
     return reduced
 
 
-def starts_of(potentials: Potentials) -> Int64:
-    """Shape (n_variables,), where the values of each variable start in an array over all values."""
-    return np.cumsum(potentials.cardinality, dtype=np.int64) - potentials.cardinality
-
-
 def bounds(potentials: Potentials) -> tuple[Float, Float]:
     """The least and the most that each value can gain from its cells; shapes (total cardinality,)."""
-    start, n = starts_of(potentials), int(potentials.cardinality.sum())
+    start, n = starts_of(potentials.cardinality), int(potentials.cardinality.sum())
     low, high = np.zeros(n), np.zeros(n)
     for c in potentials.cells:
         flat = start[c.scope] + c.value
@@ -65,7 +61,7 @@ def bounds(potentials: Potentials) -> tuple[Float, Float]:
 def dominated(potentials: Potentials) -> Bool:
     """Which values another value beats, or equals, in every world; shape (total cardinality,)."""
     low, high = bounds(potentials)
-    start = starts_of(potentials)
+    start = starts_of(potentials.cardinality)
     if not len(start):
         return np.zeros(0, np.bool_)
     owner = np.repeat(np.arange(len(start)), potentials.cardinality)
@@ -80,31 +76,35 @@ def dominated(potentials: Potentials) -> Bool:
 
 def merged(cells: Cells) -> Cells:
     """Equal cells made one, amounts that cancel left out."""
-    key = _key(cells)
-    if key is not None and (np.diff(key) > 0).all() and (cells.amount != 0).all():
+    k = cells.scope.shape[1]
+    widths = [int(part.max(initial=0)).bit_length() for part in (cells.scope, cells.value)]
+    columns = [
+        (column, bits) for part, bits in zip((cells.scope, cells.value), widths, strict=True) for column in part.T
+    ]
+    if sum(bits for _, bits in columns) > _BITS:
+        return _merged_by_columns(cells)
+    key = np.zeros(len(cells.amount), np.int64)
+    for column, bits in columns:
+        key <<= bits
+        key |= column
+    found, total = summed(key, cells.amount)
+    if found is key and (total != 0).all():
         return cells
-    order = _lexical(cells) if key is None else np.argsort(key, kind="stable")
+    found, total = found[total != 0], total[total != 0]
+    scope, value = np.empty((2, len(found), k), np.int32)
+    for column, (_, bits) in zip([*value.T[::-1], *scope.T[::-1]], reversed(columns), strict=True):
+        column[:] = found & ((1 << bits) - 1)
+        found = found >> bits
+    return Cells(scope, value, total)
+
+
+def _merged_by_columns(cells: Cells) -> Cells:
+    """The same for cells that one number does not tell apart."""
+    order = np.lexsort((*cells.value.T[::-1], *cells.scope.T[::-1]))
     scope, value, amount = cells.scope[order], cells.value[order], cells.amount[order]
     new = np.ones(len(order), np.bool_)
     new[1:] = (scope[1:] != scope[:-1]).any(axis=1) | (value[1:] != value[:-1]).any(axis=1)
     first = np.flatnonzero(new)
-    total = np.add.reduceat(amount, first) if len(first) else amount
+    total = np.add.reduceat(amount, first)
     keep = total != 0
     return Cells(scope[first[keep]], value[first[keep]], total[keep])
-
-
-def _lexical(cells: Cells) -> Int64:
-    """An order in which equal cells are neighbours."""
-    return np.lexsort((*cells.value.T[::-1], *cells.scope.T[::-1]))
-
-
-def _key(cells: Cells) -> Int64 | None:
-    """A number for each cell, the same for equal ones only; None if that takes more than 62 bits."""
-    n, k = int(cells.scope.max(initial=0)) + 1, int(cells.value.max(initial=0)) + 1
-    if cells.scope.shape[1] * np.log2(float(n) * k) > 62:
-        return None
-    key = np.zeros(len(cells.amount), np.int64)
-    for column, width in [*((c, n) for c in cells.scope.T), *((c, k) for c in cells.value.T)]:
-        key *= width
-        key += column
-    return key

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mlnlite.ground.network import Bool, Float, Int64
-from mlnlite.infer.reduce.conjunctions import Cells, cells_of, split_wide
+from mlnlite.infer.reduce.conjunctions import Cells, cells_of, split_wide, starts_of
 from mlnlite.infer.reduce.counting import Chains, Diagram, diagram, written_out
 from mlnlite.infer.reduce.potentials import Potentials
 from mlnlite.infer.reduce.propagate import propagate
@@ -79,7 +79,7 @@ def fold(potentials: Potentials) -> tuple[Potentials, tuple[Folded, ...]]:
 def _lone(potentials: Potentials) -> tuple[Bool, Int64, Float]:
     """Which variables are alone; where the values of each start, and what each value gains by itself."""
     n, cardinality = len(potentials.cardinality), potentials.cardinality
-    start = np.cumsum(cardinality, dtype=np.int64) - cardinality
+    start = starts_of(cardinality)
     own, uses = np.zeros(int(cardinality.sum())), np.zeros(n, np.int64)
     for c in potentials.cells:
         if c.scope.shape[1] == 1:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import pairwise
 
 import numpy as np
 
@@ -93,7 +93,8 @@ class Division:
         potentials: of which.
         label: shape (n_variables,), the component of each variable.
         rank: shape (n_components,), place of each component, those of equal shape together, small ones first.
-        shapes: for each rank the sorted cardinalities of a small component, None for a large one.
+        shapes: the sorted cardinalities of small components, each list once.
+        shape_starts: shape (n_shapes + 1,), where the ranks of each shape start; after the last one come large ones.
         members: variables in order of rank; those of one component by cardinality if it is small, else rising.
         starts: shape (n_components + 1,), where each rank starts in `members`.
         cells: sorted by rank.
@@ -103,7 +104,8 @@ class Division:
     potentials: Potentials
     label: Int32
     rank: Int64
-    shapes: tuple[tuple[int, ...] | None, ...]
+    shapes: tuple[tuple[int, ...], ...]
+    shape_starts: Int64
     members: Int64
     starts: Int64
     cells: tuple[Cells, ...]
@@ -128,9 +130,8 @@ def divide(potentials: Potentials, small: int = SMALL) -> Division:
     is_small = bits <= np.log2(small) + 1e-9
     order = np.lexsort((np.where(is_small[label], potentials.cardinality, 0), label))
     starts = np.searchsorted(label[order], np.arange(n + 1))
-    sizes = potentials.cardinality[order]
-    keys = [tuple(sizes[starts[i] : starts[i + 1]].tolist()) if is_small[i] else None for i in range(n)]
-    by_rank = sorted(range(n), key=lambda i: (keys[i] is None, keys[i] or (), i))
+    shapes, shape = _shapes(potentials.cardinality[order], starts, is_small)
+    by_rank = np.argsort(shape, kind="stable")
     rank = np.empty(n, np.int64)
     rank[by_rank] = np.arange(n)
     moved = np.argsort(rank[label[order]], kind="stable")
@@ -141,9 +142,28 @@ def divide(potentials: Potentials, small: int = SMALL) -> Division:
         cells.append(Cells(c.scope[rows], c.value[rows], c.amount[rows]))
         cell_starts.append(begin)
     return Division(
-        potentials, label, rank, tuple(keys[i] for i in by_rank), order[moved],
+        potentials, label, rank, shapes, np.searchsorted(shape[by_rank], np.arange(len(shapes) + 1)), order[moved],
         np.concatenate([[0], np.cumsum(lengths)]), tuple(cells), tuple(cell_starts),
     )  # fmt: skip
+
+
+def _shapes(sizes: Int32, starts: Int64, is_small: Bool) -> tuple[tuple[tuple[int, ...], ...], Int64]:
+    """The shapes of small components, and for each component the number of its shape, the next one if it is large.
+
+    Args:
+        sizes: cardinalities, component by component, rising in small ones.
+        starts: shape (n_components + 1,), where each component starts.
+        is_small: shape (n_components,).
+    """
+    shapes: list[tuple[int, ...]] = []
+    lengths, shape = np.diff(starts), np.empty(len(is_small), np.int64)
+    for length in np.flatnonzero(np.bincount(lengths[is_small])).tolist():
+        rows = np.flatnonzero(is_small & (lengths == length))
+        found, which = np.unique(sizes[starts[rows, None] + np.arange(length)], axis=0, return_inverse=True)
+        shape[rows] = len(shapes) + which.ravel()
+        shapes += [tuple(row) for row in found.tolist()]
+    shape[~is_small] = len(shapes)
+    return tuple(shapes), shape
 
 
 def batches(division: Division, take: Bool) -> Iterator[Batch]:
@@ -173,12 +193,10 @@ def batches(division: Division, take: Bool) -> Iterator[Batch]:
 
 def _stretches(division: Division) -> Iterator[tuple[int, int, tuple[int, ...]]]:
     """Ranks of small components of equal shape: first, last + 1, shape; a bounded number of table entries each."""
-    first = 0
-    for shape, group in groupby(s for s in division.shapes if s is not None):
-        end, step = first + len(list(group)), max(1, _BATCH // int(np.prod(shape)))
+    for shape, (first, end) in zip(division.shapes, pairwise(division.shape_starts.tolist()), strict=True):
+        step = max(1, _BATCH // int(np.prod(shape)))
         for begin in range(first, end, step):
             yield begin, min(begin + step, end), shape
-        first = end
 
 
 def _place_in_component(division: Division) -> Int64:
@@ -197,8 +215,8 @@ def parts(division: Division, take: Bool) -> Iterator[Part]:
     """
     local = _place_in_component(division).astype(np.int32)
     number = np.argsort(division.rank)
-    for r, shape in enumerate(division.shapes):
-        if shape is None and take[number[r]]:
+    for r in range(int(division.shape_starts[-1]), division.n_components):
+        if take[number[r]]:
             variables = division.members[division.starts[r] : division.starts[r + 1]]
             cells = tuple(
                 Cells(local[c.scope[b[r] : b[r + 1]]], c.value[b[r] : b[r + 1]], c.amount[b[r] : b[r + 1]])
@@ -226,7 +244,15 @@ def value_of(part: Part, world: Int64) -> float:
         part: the component.
         world: shape (n,), a value for each variable.
     """
-    return float(sum(c.amount[(world[c.scope] == c.value).all(axis=1)].sum() for c in part.cells))
+    return float(sum(c.amount[holding(c, world)].sum() for c in part.cells))
+
+
+def holding(cells: Cells, world: Int64) -> Bool:
+    """Which cells hold in a world, see `value_of`; shape (n_cells,)."""
+    holds = np.ones(len(cells.amount), np.bool_)
+    for variable, value in zip(cells.scope.T, cells.value.T, strict=True):
+        holds &= world[variable] == value
+    return holds
 
 
 def grain_of(amounts: Sequence[Float]) -> float:

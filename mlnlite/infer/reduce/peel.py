@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from mlnlite.ground.network import Bool, Float, Int32, Int64
-from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.conjunctions import Cells, starts_of
 from mlnlite.infer.reduce.fill import Placed, fill
 from mlnlite.infer.reduce.potentials import Potentials
 
@@ -136,7 +136,7 @@ def _rounds(potentials: Potentials, names: Int64, fewest: int) -> list[_Edge]:
 def _single(potentials: Potentials) -> tuple[Int64, Float]:
     """Where the values of each variable start, and the amounts that each value gains by itself."""
     cardinality = potentials.cardinality
-    start = np.cumsum(cardinality, dtype=np.int64) - cardinality
+    start = starts_of(cardinality)
     amount = np.zeros(int(cardinality.sum()))
     for c in potentials.cells:
         if c.scope.shape[1] == 1:
@@ -182,15 +182,16 @@ def _core(potentials: Potentials, single: Float, leaves: list[Leaves]) -> Potent
     gone = np.zeros(len(potentials.cardinality), np.bool_)
     for group in leaves:
         gone[group.variable] = True
-    variable = np.repeat(np.arange(len(gone), dtype=np.int32), potentials.cardinality)
-    value = np.concatenate([np.arange(k, dtype=np.int32) for k in potentials.cardinality.tolist()])
+    start, cardinality = starts_of(potentials.cardinality), potentials.cardinality
+    variable = np.repeat(np.arange(len(gone), dtype=np.int32), cardinality)
+    value = (np.arange(len(variable)) - np.repeat(start, cardinality)).astype(np.int32)
     own = Cells(variable[:, None], value[:, None], single)
     cells = [_pick(own, (single != 0) & ~gone[variable])]
     for c in potentials.cells:
         if c.scope.shape[1] > 1:
             cells.append(_pick(c, np.logical_not(gone[c.scope].any(axis=1))))
-    cardinality = np.where(gone, 1, potentials.cardinality).astype(np.int32)
-    return replace(potentials, cardinality=cardinality, cells=tuple(c for c in cells if len(c.amount)))
+    left = np.where(gone, 1, cardinality).astype(np.int32)
+    return replace(potentials, cardinality=left, cells=tuple(c for c in cells if len(c.amount)))
 
 
 def _pick(cells: Cells, which: Bool) -> Cells:

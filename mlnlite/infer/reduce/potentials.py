@@ -121,6 +121,9 @@ def _clause_rows(network: Network, clauses: Clauses) -> tuple[list[Conjunctions]
     weight = network.weights[clauses.weight] * clauses.count
     atoms, false = np.abs(clauses.literals) - 1, clauses.literals < 0
     soft, hard = np.isfinite(weight) & (weight != 0), np.isposinf(weight)
+    if soft.all():
+        gain = weight if clauses.negated else -weight
+        return [literals_of(network, atoms, false, gain)], 0.0 if clauses.negated else float(weight.sum())
     gain = weight[soft] if clauses.negated else -weight[soft]
     rows = [literals_of(network, atoms[soft], false[soft], gain)]
     if clauses.negated:  # a hard conjunction forbids each of its literals to fail

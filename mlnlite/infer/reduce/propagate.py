@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlnlite.ground.network import Bool, Int32, Int64
-from mlnlite.infer.reduce.conjunctions import Cells, gather
+from mlnlite.infer.reduce.conjunctions import Cells, gather, starts_of
 
 _PASSES = 100
 
@@ -44,7 +44,7 @@ def propagate(cells: Sequence[Cells], cardinality: Int32, constant: float) -> tu
     """
     grouped = joined(cells)
     hard = [_pick(c, np.isneginf(c.amount)) for c in grouped]
-    start = np.cumsum(cardinality, dtype=np.int64) - cardinality
+    start = starts_of(cardinality)
     forbidden = np.zeros(int(cardinality.sum()), np.bool_)
     for _ in range(_PASSES):
         known = _Known(start, forbidden, _fixed(forbidden, cardinality, start))

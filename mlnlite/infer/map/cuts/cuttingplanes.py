@@ -22,7 +22,7 @@ from mlnlite.infer.map.rungs import Options
 from mlnlite.infer.map.satisfy import feasible_world
 from mlnlite.infer.reduce.parts import Part
 from mlnlite.infer.reduce.potentials import potentials_of
-from mlnlite.infer.score import costs, log_weight, truth_of
+from mlnlite.infer.score import cost, counts, log_weight, truth_of
 
 CUTTING_PLANES = "cutting planes"
 _CLOSE = 1e-4
@@ -111,7 +111,7 @@ def _is_close(lazy: Lazy, found: list[tuple[float, BestWorld]], bound: float, ga
     value, best = max(found, key=lambda f: f[0])
     if not np.isfinite(value):
         return False
-    return bound - value <= max(_CLOSE, gap * float(costs(lazy.network, best.truth)[0].sum()))
+    return bound - value <= max(_CLOSE, gap * cost(lazy.network, counts(lazy.network, best.truth)))
 
 
 def _with_nothing(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.ground.network import Float, Int64
-from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.deadline import FOREVER, Deadline
 from mlnlite.infer.map.search.landscape import Landscape, landscape_of, missing_of, worth
 from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains
 
@@ -17,7 +17,6 @@ ANNEALING = "annealing"
 _COLDEST = 0.05
 _CHUNK = 2_000_000
 _MOVES, _PER_VARIABLE = 2e7, 20_000
-FOREVER = Deadline()
 
 
 def solve_part(

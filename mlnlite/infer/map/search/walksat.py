@@ -8,13 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.ground.network import Int64
-from mlnlite.infer.deadline import Deadline
+from mlnlite.infer.deadline import FOREVER, Deadline
 from mlnlite.infer.map.search.landscape import Landscape, landscape_of, missing_of, worth
 from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains
 
 MAXWALKSAT = "maxwalksat"
 _NOISE, _TABU, _CHUNK = 0.1, 5, 100_000
-FOREVER = Deadline()
 
 
 def solve_part(
