@@ -9,13 +9,14 @@ from mlnlite.errors import Contradiction
 from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.exact.elimination import best_world
 from mlnlite.infer.exact.order import plan
-from mlnlite.infer.map import ilp, maxsat, mincut, relaxation, toulbar2
+from mlnlite.infer.map import ilp, ladder, maxsat, mincut, relaxation, rungs, toulbar2
 from mlnlite.infer.map.flow_kernel import arcs, greedy, push, seeds
 from mlnlite.infer.map.ladder import map_of
 from mlnlite.infer.map.search import annealing, walksat
 from mlnlite.infer.map.search.annealing_kernel import sweeps
 from mlnlite.infer.map.search.landscape import landscape_of, missing_of, worth
 from mlnlite.infer.map.search.walksat_kernel import walk
+from mlnlite.infer.map.twins import twins_of
 from mlnlite.infer.reduce.conjunctions import Cells
 from mlnlite.infer.reduce.dominance import merged, without_dominated
 from mlnlite.infer.reduce.narrow import narrowed
@@ -296,6 +297,59 @@ def test_flows_do_what_their_python_does(seed, monkeypatch):
     plain = mincut.solve_part(part)
     assert compiled.world.tolist() == plain.world.tolist()
     assert plain.optimal
+
+
+def renamed(part, rng):
+    """The same component with variables and their values in another order."""
+    order = rng.permutation(len(part.variables))
+    values = [rng.permutation(k) for k in part.cardinality]
+    cells = []
+    for c in part.cells:
+        value = np.array(
+            [[values[v][x] for v, x in zip(*row, strict=True)] for row in zip(c.scope, c.value, strict=True)]
+        )
+        rows = rng.permutation(len(c.amount))
+        column = np.argsort(order[c.scope[rows]], axis=1)
+        scope = np.take_along_axis(order[c.scope[rows]], column, axis=1).astype(np.int32)
+        value = np.take_along_axis(value.reshape(c.scope.shape)[rows], column, axis=1).astype(np.int32)
+        cells.append(Cells(scope, value, c.amount[rows]))
+    cardinality = np.empty_like(part.cardinality)
+    cardinality[order] = part.cardinality
+    return Part(0, part.variables, cardinality, tuple(cells))
+
+
+@settings(max_examples=40, deadline=None)
+@given(net=networks(with_counts=False), other=networks(with_counts=False), seed=st.integers(0, 99))
+def test_copies_have_the_worlds_of_their_originals(net, other, seed):
+    rng = np.random.default_rng(seed)
+    part, different = whole(net)[1], whole(other)[1]
+    twins = twins_of([part, different, renamed(part, rng), part])
+    assert twins.original[3] == 0
+    assert twins.original[1] in (0, 1)
+    for i, copy in ((2, renamed(part, np.random.default_rng(seed))), (3, part)):
+        if twins.original[i] == 0:
+            world = np.array([rng.integers(k) for k in part.cardinality])
+            assert value_of(copy, twins.world(i, world)) == pytest.approx(value_of(part, world))
+
+
+@pytest.mark.parametrize("method", ["auto", "ilp", "ve"])
+def test_copies_are_solved_once(method, monkeypatch):
+    rng, n = np.random.default_rng(0), 14
+    weights = [round(float(w), 2) for w in rng.normal(0, 1, 40)]
+    names = [np.arange(n), n + rng.permutation(n), 2 * n + rng.permutation(n)]
+    clauses = []
+    for w in range(len(weights)):
+        atoms, signs = rng.choice(n, 3, replace=False), rng.choice([-1, 1], 3)
+        clauses.append(([((signs * (own[atoms] + 1)).tolist(), w, 1) for own in names], False))
+    net, searched = network([("", 1)] * (3 * n), clauses, (), weights), []
+    search, eliminate = rungs._search, ladder._eliminate
+    monkeypatch.setattr(rungs, "_search", lambda *a: searched.append(a[0]) or search(*a))
+    monkeypatch.setattr(ladder, "_eliminate", lambda *a: searched.append(a[0]) or eliminate(*a))
+    best = map_of(net, method=method)
+    assert {id(part) for part in searched} == {id(searched[0])}
+    assert best.status == "optimal"
+    assert best.truth[names[0]].tolist() == best.truth[names[1]].tolist() == best.truth[names[2]].tolist()
+    assert best.log_weight == pytest.approx(map_of(net, method="wcsp").log_weight)
 
 
 def test_equal_cells_merge_whatever_their_width():

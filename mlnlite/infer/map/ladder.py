@@ -18,6 +18,7 @@ from mlnlite.infer.exact.order import TooWide, plan
 from mlnlite.infer.map import mincut
 from mlnlite.infer.map.rungs import Method, Options, answers_of
 from mlnlite.infer.map.satisfy import feasible_world
+from mlnlite.infer.map.twins import twins_of
 from mlnlite.infer.reduce.components import labels_of
 from mlnlite.infer.reduce.dominance import without_dominated
 from mlnlite.infer.reduce.equivalence import contracted, put_back_ties
@@ -153,15 +154,27 @@ def _climb(network: Network, core: Potentials, options: Options, width_limit: in
     everything = np.ones(n, np.bool_)
     for batch in batches(division, everything):
         _list_worlds(batch, search)
-    large = parts(division, everything)
-    wide = [p for p in large if not (eliminates and _eliminate(p, options.method, width_limit, search))]
+    large = list(parts(division, everything))
+    twins = twins_of(large)
+    originals = [large[i] for i in np.flatnonzero(twins.original == np.arange(len(large))).tolist()]
+    wide = [p for p in originals if not (eliminates and _eliminate(p, options.method, width_limit, search))]
     if np.isneginf(core.constant) or np.isneginf(search.best).any():
         raise contradiction(network)
     if wide and options.method == "ve":
         raise limit_reached(network, search.wide, width_limit)
     for part, answers in zip(wide, answers_of(wide, options), strict=True):
         _choose(network, part, answers, search)
+    for i, original in enumerate(twins.original.tolist()):
+        if original != i:
+            _copy(large[i], large[original], twins.world(i, search.values[large[original].variables]), search)
     return search, division.label
+
+
+def _copy(part: Part, original: Part, world: Int64, search: _Search) -> None:
+    """What is known of a component, said of a copy of it."""
+    search.values[part.variables] = world
+    for answer in (search.best, search.method, search.status, search.gap):
+        answer[part.component] = answer[original.component]
 
 
 def _answer(network: Network, label: Int32, search: _Search) -> BestWorld:

@@ -12,7 +12,7 @@ from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.map import ilp, maxsat, mincut, relaxation, toulbar2
 from mlnlite.infer.map.cuts import cycles
 from mlnlite.infer.map.search import annealing, walksat
-from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains, identity, value_of
+from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains, value_of
 from mlnlite.infer.workers.ask import Ask, workers
 
 Method = Literal["auto", "ve", "mincut", "ilp", "wcsp", "maxsat", "annealing", "maxwalksat"]
@@ -72,20 +72,15 @@ Rung = Callable[[Part, Deadline, list[PartAnswer]], PartAnswer | None]
 
 
 def answers_of(parts: Sequence[Part], options: Options) -> Iterator[list[PartAnswer]]:
-    """What solvers say of each component; equal components are solved once.
+    """What solvers say of each component.
 
     Args:
         parts: components.
         options: how to search; the time left is shared out evenly.
     """
-    known: dict[object, list[PartAnswer]] = {}
     with workers() as ask:
         for i, part in enumerate(parts):
-            key = identity(part)
-            if key not in known:
-                deadline = options.deadline.within(options.deadline.left / (len(parts) - i))
-                known[key] = _search(part, options, deadline, ask)
-            yield known[key]
+            yield _search(part, options, options.deadline.within(options.deadline.left / (len(parts) - i)), ask)
 
 
 def _search(part: Part, options: Options, deadline: Deadline, ask: Ask) -> list[PartAnswer]:
