@@ -36,6 +36,18 @@ def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401
     return njit(cache=True, nogil=True)(function)
 
 
+def compiled_part(function: Callable[..., Any]) -> Any:  # noqa: ANN401
+    """The same for a small function that compiled functions call often and that makes no arrays.
+
+    It does not count references to the arrays it gets, which could take several times as long as what it does.
+    """
+    prepare_cache()
+    from numba import njit
+
+    options: dict[str, Any] = {"_nrt": False}
+    return njit(cache=True, nogil=True, **options)(function)
+
+
 @cache
 def _announce_compiling() -> None:
     """Says once what takes so long, through the logger `mlnlite`, which by default writes to standard error."""

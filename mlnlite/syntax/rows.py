@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.source import Source
-from mlnlite.syntax.coded import Coded, Keys, coded, numbered_words
+from mlnlite.syntax.coded import Codes, coded
 from mlnlite.syntax.facts import FactTable
+
+Number = TypeVar("Number", bound=np.generic)
 
 
 @dataclass(slots=True)
@@ -28,7 +30,7 @@ class Piece:
 
     Attributes:
         predicate: its name.
-        words: one for each argument, shape (n, k): see `numbered_words`.
+        words: one for each argument, shape (n,), numbers of words.
         truth: shape (n,).
         database: shape (n,).
         offset: shape (n,), where in the source each starts.
@@ -36,7 +38,7 @@ class Piece:
     """
 
     predicate: str
-    words: tuple[Keys, ...]
+    words: tuple[Codes, ...]
     truth: NDArray[np.bool_]
     database: NDArray[np.int32]
     offset: NDArray[np.int64]
@@ -92,41 +94,56 @@ class Rows:
         key = source, piece.predicate, len(piece.words), piece.weight is not None
         self.pieces.setdefault(key, []).append(piece)
 
-    def tables(self) -> list[FactTable]:
-        """All facts, as tables in the order of their sources and first facts."""
+    def tables(self, words: Sequence[str] = ()) -> list[FactTable]:
+        """All facts, as tables in the order of their sources and first facts; `words`: those that pieces number."""
         sources = {id(key[0]): rank for rank, key in reversed(list(enumerate(self.pieces)))}
-        tables = [_table(key, pieces, self.single.get(key, _Single())) for key, pieces in self.pieces.items()]
+        numbers = dict(zip(words, range(len(words)), strict=True)) if self.single else {}
+        for key, single in self.single.items():
+            self.pieces[key].append(_piece(key, single, numbers))
+        names = list(numbers) if numbers else words
+        tables = [_table(key, pieces, names) for key, pieces in self.pieces.items()]
         return sorted(tables, key=lambda table: (sources[id(table.source)], table.offset[0]))
 
 
-def _table(key: _Key, pieces: Sequence[Piece], single: _Single) -> FactTable:
+def _piece(key: _Key, rows: _Single, numbers: dict[str, int]) -> Piece:
+    """Rows that came one by one; `numbers` gains their words."""
+    _, predicate, arity, soft = key
+    words = np.array([numbers.setdefault(word, len(numbers)) for word in rows.words], np.int32)
+    return Piece(
+        predicate,
+        tuple(words[i::arity] for i in range(arity)),
+        np.array(rows.truth, np.bool_),
+        np.array(rows.database, np.int32),
+        np.array(rows.offset, np.int64),
+        np.array(rows.weight, np.float64) if soft else None,
+    )
+
+
+def _table(key: _Key, pieces: Sequence[Piece], names: Sequence[str]) -> FactTable:
+    """Facts as a table, in their order; `names`: of the words."""
     source, predicate, arity, soft = key
-    pieces = sorted(pieces, key=lambda p: p.words[0].shape[1] if p.words else 0)
-    offset = np.concatenate([*(p.offset for p in pieces), np.array(single.offset, np.int64)])
-    truth = np.concatenate([*(p.truth for p in pieces), np.array(single.truth, np.bool_)])
-    database = np.concatenate([*(p.database for p in pieces), np.array(single.database, np.int32)])
-    weight = np.concatenate([*(p.weight for p in pieces if p.weight is not None), np.array(single.weight, np.float64)])
-    columns = [_column([p.words[i] for p in pieces], single.words[i::arity]) for i in range(arity)]
-    if (offset[1:] < offset[:-1]).any():
-        order = np.argsort(offset)
-        offset, truth, database, weight = (
-            offset[order],
-            truth[order],
-            database[order],
-            weight[order] if soft else weight,
-        )
-        columns = [coded(column.codes[order], column.names) for column in columns]
-    return FactTable(predicate, tuple(columns), truth, database, weight if soft else None, offset, source)
+    offset = np.concatenate([p.offset for p in pieces])
+    order = np.argsort(offset) if (offset[1:] < offset[:-1]).any() else slice(None)
+
+    def whole(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
+        joined: NDArray[Number] = np.concatenate(parts)
+        return joined[order]
+
+    return FactTable(
+        predicate,
+        tuple(coded(whole([p.words[i] for p in pieces]), names) for i in range(arity)),
+        whole([p.truth for p in pieces]),
+        whole([p.database for p in pieces]),
+        whole([p.weight for p in pieces if p.weight is not None]) if soft else None,
+        offset[order],
+        source,
+    )
 
 
-def _column(pieces: Sequence[Keys], single: Sequence[str]) -> Coded:
-    """A column of constants; pieces of equal width stand together."""
-    parts = [numbered_words(np.concatenate(list(same))) for _, same in groupby(pieces, key=lambda w: w.shape[1])]
-    if single:
-        index = {name: i for i, name in enumerate(dict.fromkeys(single))}
-        parts.append((np.fromiter(map(index.__getitem__, single), np.int32, len(single)), list(index)))
-    if len(parts) == 1:
-        return Coded(parts[0][1], parts[0][0])
-    index = {}
-    numbers = [np.array([index.setdefault(n, len(index)) for n in names], np.int32) for _, names in parts]
-    return Coded(list(index), np.concatenate([n[codes] for n, (codes, _) in zip(numbers, parts, strict=True)]))
+def log_odds(probability: float) -> float:
+    """The weight of soft evidence.
+
+    >>> log_odds(0.5)
+    0.0
+    """
+    return float(np.log(probability) - np.log1p(-probability))

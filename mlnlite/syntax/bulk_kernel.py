@@ -1,0 +1,307 @@
+"""Compiled: facts on lines of their own, from bytes to numbers of words."""
+
+# mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: ANN001, ANN201, ANN202
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.compiled import compiled, compiled_part
+
+LONGEST = 256
+"""Bytes of the longest word that is read here."""
+PADDING = 2 * LONGEST
+"""Zeros behind a text."""
+WIDEST = 64
+"""Words of the longest fact that is read here."""
+END, FULL, LEFT, LEFT_LAST = range(4)
+"""Why reading stops: all is read; no room for more facts; lines are left that are no such facts, or are the last."""
+POSITION, SKIPPED, DATABASE, SEPARATOR, FIRST_LEFT, N_FACTS, N_WORDS, N_STATE = range(8)
+"""The state: the next byte; how many bytes before it go on with a character; the database; whether `---` was read last;
+the character from which on lines are left, or -1; how many facts there are, and how many words these have."""
+BEGIN, FIRST, ARITY, TRUTH, CHANCE, IN_DATABASE, N_COLUMNS = range(7)
+"""Columns of a fact: where it begins, in characters; its first word, the predicate, which arguments follow; how many
+these are; whether it is true; whether a number in front is the word behind the arguments, there is none, or `?`."""
+NUMBER, CERTAIN, UNKNOWN, N_CHANCES = range(4)
+
+
+class Text(NamedTuple):
+    """A text as bytes.
+
+    Attributes:
+        letters: shape (n,), with `PADDING`.
+        blocks: shape (n - 7,), the eight bytes from each one on as a number.
+    """
+
+    letters: NDArray[np.uint8]
+    blocks: NDArray[np.uint64]
+
+
+class Found(NamedTuple):
+    """Facts in order, and their words.
+
+    Attributes:
+        rows: shape (n, N_COLUMNS).
+        keys: of each word the first eight bytes, or a mixture of all.
+        begins: of each word.
+        lengths: of each word, in bytes.
+    """
+
+    rows: NDArray[np.int32]
+    keys: NDArray[np.uint64]
+    begins: NDArray[np.int32]
+    lengths: NDArray[np.int32]
+
+
+class Words(NamedTuple):
+    """All words so far, each once.
+
+    Attributes:
+        letters: the bytes of all of them.
+        begins: shape (n,), where each begins, and where the last one ends.
+        table: shape (2 n, 2), n a power of 2, an open hash table: keys, and lengths and numbers, 0 where it is free.
+    """
+
+    letters: NDArray[np.uint8]
+    begins: NDArray[np.int64]
+    table: NDArray[np.int64]
+
+
+# What a byte is: a letter or digit, a sign that may stand in a word, one that a letter must follow, or of no word.
+_PLAIN, _INSIDE, _JOINS, _OUTSIDE = range(4)
+_KIND = np.full(256, _OUTSIDE, np.uint8)
+_KIND[list(b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_")] = _PLAIN
+_KIND[list(b"'$~")], _KIND[list(b"-.:;/")] = _INSIDE, _JOINS
+_NEWLINE, _TAB, _RETURN, _FEED, _BLANK, _QUOTE, _BACKSLASH, _DELETE = b'\n\t\r\f "\\\x7f'
+_DASH, _DOT, _ZERO, _NINE, _NOT, _QUESTION, _EQUAL, _COMMA, _OPENS, _CLOSES = b"-.09!?=,()"
+_SPREAD, _HIGH = np.uint64(0x9E3779B97F4A7C15), np.uint64(29)
+_MASKS = np.array([(1 << (8 * n)) - 1 for n in range(9)], np.uint64)
+_BITS = 32  # of a number in the table of words; the length stands above them
+_NUMBER = (1 << _BITS) - 1
+
+
+@compiled
+def read_lines(text, found, state):
+    """Reads facts until there is a reason to stop, which it returns: see `END`.
+
+    Args:
+        text: whole lines.
+        found: the facts, which become more.
+        state: shape (N_STATE,), where reading is, brought up to date.
+    """
+    while state[POSITION] < len(text.letters) - PADDING:
+        if state[N_FACTS] == len(found.rows) or state[N_WORDS] + WIDEST > len(found.keys):
+            return FULL
+        at = _behind_blanks(text.letters, state[POSITION])
+        behind = _read_fact(text, at, found, state)
+        if behind < 0:
+            _pass_line(text.letters, at, state)
+        elif state[FIRST_LEFT] >= 0:
+            return LEFT
+        else:
+            row = found.rows[state[N_FACTS]]
+            state[N_WORDS] += row[ARITY] + 1 + (row[CHANCE] == NUMBER)
+            state[N_FACTS] += 1
+            state[SEPARATOR], state[POSITION] = 0, behind
+    return LEFT_LAST if state[FIRST_LEFT] >= 0 else END
+
+
+@compiled
+def number_words(text, found, done, numbers, words, n_known):
+    """Gives words their numbers: that of a word known before, or the next one.
+
+    Args:
+        text: where the words stand.
+        found: the words.
+        done: how many of these have numbers.
+        numbers: shape (n,), of the first n of these words, written here.
+        words: all words, which become more.
+        n_known: how many these are.
+
+    Returns:
+        How many have numbers now, fewer than n if there is no room for new words, and how many words are known.
+    """
+    table, last, shift = words.table, len(words.table) - 1, _shift(words.table)
+    for i in range(done, len(numbers)):
+        key, begin, length = found.keys[i], found.begins[i], found.lengths[i]
+        slot, number = np.int64((key * _SPREAD) >> shift), -1
+        while number < 0 and table[slot, 1]:
+            if np.uint64(table[slot, 0]) == key and table[slot, 1] >> _BITS == length:
+                number = (table[slot, 1] & _NUMBER) - 1
+                if length > 8 and not _is(text.letters, begin, length, words, number):
+                    number = -1
+            slot = (slot + 1) & last
+        if number < 0:
+            number, at = n_known, words.begins[n_known]
+            if n_known + 1 == len(words.begins) or at + length > len(words.letters):
+                return i, n_known
+            table[slot, 0], table[slot, 1] = np.int64(key), (length << _BITS) + number + 1
+            for k in range(length):
+                words.letters[at + k] = text.letters[begin + k]
+            words.begins[number + 1] = at + length
+            n_known += 1
+        numbers[i] = number
+    return len(numbers), n_known
+
+
+@compiled
+def enter(old, table):
+    """Enters what one table of words holds into another, empty one."""
+    shift = _shift(table)
+    for i in range(len(old)):
+        if old[i, 1]:
+            slot = np.int64((np.uint64(old[i, 0]) * _SPREAD) >> shift)
+            while table[slot, 1]:
+                slot = (slot + 1) & (len(table) - 1)
+            table[slot] = old[i]
+
+
+# --- lines
+
+
+@compiled_part
+def _read_fact(text, at, found, state):
+    """Reads the fact that begins at a byte, if its line is one; returns the begin of the next line, or -1."""
+    letters, row, first = text.letters, found.rows[state[N_FACTS]], state[N_WORDS]
+    begin, chance, front, front_end, is_value = at, CERTAIN, at, at, False
+    if letters[at] == _NOT or letters[at] == _QUESTION:
+        chance = UNKNOWN if letters[at] == _QUESTION else CERTAIN
+        at += 1
+    elif letters[_behind_name(letters, at)] != _OPENS:
+        front_end = _behind_term(letters, at)
+        at = _behind_blanks(letters, front_end)
+        is_value = front_end > front and letters[at] == _EQUAL
+        if is_value:
+            at = _behind_blanks(letters, at + 1)
+        elif at > front_end > front and _is_chance(letters, front, front_end):
+            chance = NUMBER
+        else:
+            return -1
+    stop = _behind_name(letters, at)
+    if stop == at or letters[stop] != _OPENS or _ZERO <= letters[at] <= _NINE or stop - at > LONGEST:
+        return -1
+    _note(text, at, stop, found, first)
+    at, arity = _read_arguments(text, stop, found, first + 1)
+    if front_end > front:
+        _note(text, front, front_end, found, first + 1 + arity)
+    row[BEGIN], row[FIRST], row[ARITY] = begin - state[SKIPPED], first, arity + is_value
+    row[TRUTH], row[CHANCE], row[IN_DATABASE] = letters[begin] != _NOT, chance, state[DATABASE]
+    return at
+
+
+@compiled_part
+def _read_arguments(text, at, found, first):
+    """Reads the arguments behind a bracket; returns the begin of the next line, or -1, and how many there are."""
+    letters, n, sign = text.letters, 0, _COMMA
+    while sign == _COMMA and n < WIDEST - 2:
+        at = _behind_blanks(letters, at + 1)
+        stop = _behind_term(letters, at)
+        if stop == at:
+            return -1, n
+        _note(text, at, stop, found, first + n)
+        n += 1
+        at = _behind_blanks(letters, stop)
+        sign = letters[at]
+    at += sign == _CLOSES
+    while letters[at] in (_BLANK, _TAB, _RETURN):
+        at += 1
+    return at + 1 if sign == _CLOSES and letters[at] == _NEWLINE else -1, n
+
+
+@compiled_part
+def _note(text, at, stop, found, index):
+    """Notes a word, without its quotes."""
+    quoted = text.letters[at] == _QUOTE
+    at += quoted
+    length = stop - quoted - at
+    key = text.blocks[at] & _MASKS[min(length, 8)]
+    for i in range(8, length, 8):
+        key = (key ^ (key >> _HIGH)) * _SPREAD + (text.blocks[at + i] & _MASKS[min(length - i, 8)])
+    found.keys[index], found.begins[index], found.lengths[index] = key, at, length
+
+
+@compiled_part
+def _pass_line(letters, at, state):
+    """Passes over a line that is no such fact: blank, `---`, or one that is left with those that are left already."""
+    dashes = letters[at] == _DASH and letters[at + 1] == _DASH and letters[at + 2] == _DASH
+    blank, skipped = True, 0
+    at += 3 * dashes
+    while letters[at] != _NEWLINE:
+        blank = blank and letters[at] in (_BLANK, _TAB, _RETURN, _FEED)
+        skipped += (letters[at] & 0xC0) == 0x80
+        at += 1
+    if state[FIRST_LEFT] < 0 and blank and dashes:
+        state[DATABASE] += 1
+        state[SEPARATOR] = 1
+    elif state[FIRST_LEFT] < 0 and not blank:
+        state[FIRST_LEFT] = state[POSITION] - state[SKIPPED]
+    state[SKIPPED] += skipped
+    state[POSITION] = at + 1
+
+
+# --- words: where each ends is where it begins if there is none
+
+
+@compiled_part
+def _behind_blanks(letters, at):
+    while letters[at] in (_BLANK, _TAB):
+        at += 1
+    return at
+
+
+@compiled_part
+def _behind_name(letters, at):
+    while _KIND[letters[at]] == _PLAIN:
+        at += 1
+    return at
+
+
+@compiled_part
+def _behind_term(letters, at):
+    """The end of a word or a quoted text without escapes: see the terminals WORD and STRING of the grammars."""
+    begin, last = at, at + LONGEST
+    if letters[at] == _QUOTE:
+        at += 1
+        while _BLANK <= letters[at] < _DELETE and letters[at] != _QUOTE and letters[at] != _BACKSLASH:
+            at += 1
+        return at + 1 if letters[at] == _QUOTE and at < last else begin
+    at += letters[at] == _DASH
+    if _KIND[letters[at]] != _PLAIN:
+        return begin
+    while _KIND[letters[at]] < _JOINS or (_KIND[letters[at]] == _JOINS and _KIND[letters[at + 1]] == _PLAIN):
+        at += 1
+    return at if at <= last else begin
+
+
+@compiled_part
+def _is_chance(letters, at, stop):
+    """Whether a word is a number between 0 and 1: `0.7`."""
+    positive = False
+    for i in range(at + 2, stop):
+        if not _ZERO <= letters[i] <= _NINE:
+            return False
+        positive = positive or letters[i] != _ZERO
+    return positive and letters[at] == _ZERO and letters[at + 1] == _DOT
+
+
+@compiled_part
+def _shift(table):
+    """How far to shift so that a number of 64 bits becomes a slot of a table."""
+    n, shift = len(table), np.uint64(64)
+    while n > 1:
+        n >>= 1
+        shift -= np.uint64(1)
+    return shift
+
+
+@compiled_part
+def _is(letters, at, length, words, number):
+    """Whether the bytes from a place on are a word."""
+    i = 0
+    while i < length and letters[at + i] == words.letters[words.begins[number] + i]:
+        i += 1
+    return i == length
