@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import repeat
-from typing import ClassVar
+from itertools import count, filterfalse
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,14 @@ from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean, in_order
 from mlnlite.model.derived import compared, verify_constants
 from mlnlite.model.evidence import Evidence, Facts, SoftFacts
 from mlnlite.model.model import Model
+from mlnlite.model.order import blocks, ordered
 from mlnlite.model.soft import SoftColumns, place, soft_mistakes
 from mlnlite.model.symbols import Predicate, Type
 from mlnlite.source import Source, Span
+from mlnlite.syntax.coded import Coded
 from mlnlite.syntax.facts import EvidenceProgram, FactTable
+
+Number = TypeVar("Number", bound=np.generic)
 
 MOST_MISTAKES = 50
 """Mistakes reported for one predicate of one file; more are counted."""
@@ -37,6 +40,8 @@ class _Columns:
 
 @dataclass(slots=True)
 class _Reading:
+    """What is known so far; `met`: for the constants of a column, taken as a type, their ids, or -1."""
+
     predicates: Mapping[str, Predicate]
     types: dict[str, dict[str, int]]
     sources: list[Source] = field(default_factory=list)
@@ -45,15 +50,28 @@ class _Reading:
     soft: dict[str, SoftColumns] = field(default_factory=dict)
     cuts: dict[tuple[str, int], tuple[float, ...]] = field(default_factory=dict)
     mistakes: list[Diagnostic] = field(default_factory=list)
+    met: dict[tuple[str, int], tuple[Sequence[str], NDArray[np.int32]]] = field(default_factory=dict)
 
-    def ids(self, type_name: str, names: Sequence[str]) -> NDArray[np.int32]:
+    def ids(self, type_name: str, names: Sequence[str]) -> list[int]:
         """Ids of constants, new ones for those not seen before."""
         index = self.types[type_name]
-        if not index:
-            index.update(zip(dict.fromkeys(names), range(len(names)), strict=False))
-        found = np.fromiter(map(index.get, names, repeat(-1)), np.int32, len(names))
-        for i in np.flatnonzero(found < 0).tolist():
-            found[i] = index.setdefault(names[i], len(index))
+        index.update(zip(dict.fromkeys(filterfalse(index.__contains__, names)), count(len(index)), strict=False))
+        return list(map(index.__getitem__, names))
+
+    def ids_of(self, type_name: str, column: Coded) -> NDArray[np.int32]:
+        """The id of the constant of each row."""
+        _, ids = self.met.setdefault(
+            (type_name, id(column.names)), (column.names, np.full(len(column.names), -1, np.int32))
+        )
+        found = np.empty(len(column.codes), np.int32)
+        for block in blocks(len(found)):
+            codes = column.codes[block]
+            found[block] = ids[codes]
+            if found[block].min() < 0:
+                new, first = np.unique(codes[found[block] < 0], return_index=True)
+                new = new[np.argsort(first)]
+                ids[new] = self.ids(type_name, [column.names[i] for i in new.tolist()])
+                found[block] = ids[codes]
         return found
 
 
@@ -176,7 +194,7 @@ def _read_file(program: EvidenceProgram | TableFacts, first: int, reading: _Read
             reading.mistakes.append(Diagnostic("E301", message, declaration.span, hint, expected="a type of the model"))
             continue
         ids = reading.ids(declaration.name, [c.name for c in declaration.constants])
-        reading.declared.append((first, first + program.n_databases, declaration.name, ids.tolist()))
+        reading.declared.append((first, first + program.n_databases, declaration.name, ids))
     for table in program.facts:
         _read_table(table, first, reading)
     if isinstance(program, TableFacts):
@@ -201,8 +219,8 @@ def _read_table(table: FactTable, first: int, reading: _Reading) -> None:
         return
     arguments = np.empty((len(table.truth), predicate.arity), np.int32)
     for i, (type_name, column) in enumerate(zip(predicate.types, table.columns, strict=True)):
-        arguments[:, i] = reading.ids(type_name, column.names)[column.codes]
-    file, database = len(reading.sources), table.database + np.int32(first)
+        arguments[:, i] = reading.ids_of(type_name, column)
+    file, database = len(reading.sources), table.database + np.int32(first) if first else table.database
     reading.sources.append(table.source)
     if table.weight is not None:
         soft = reading.soft.setdefault(predicate.name, SoftColumns())
@@ -220,7 +238,7 @@ def _mention(program: TableFacts, first: int, reading: _Reading) -> None:
     """Notes the constants of all rows of a table, those that say nothing included, and cut points."""
     predicate = reading.predicates[program.facts[0].predicate]
     for type_name, names in zip(predicate.types, program.constants, strict=True):
-        reading.declared.append((first, first + 1, type_name, reading.ids(type_name, names).tolist()))
+        reading.declared.append((first, first + 1, type_name, reading.ids(type_name, names)))
     reading.cuts.update({(predicate.name, i): points for i, points in program.cuts.items()})
 
 
@@ -252,28 +270,28 @@ def _sorted(name: str, reading: _Reading) -> Facts:
     if columns is None:
         return Facts(np.empty(0, np.int32), np.empty((0, predicate.arity), np.int32), np.empty(0, np.bool_))
     sizes = [len(reading.types[t]) for t in predicate.types]
-    database, arguments = np.concatenate(columns.database), np.concatenate(columns.arguments)
-    facts, order = _ranked(database, arguments, np.concatenate(columns.truth), sizes)
-    database, arguments, truth = facts.database, facts.arguments, facts.truth
-    again = np.zeros(len(truth), np.bool_)
-    again[1:] = (database[1:] == database[:-1]) & (arguments[1:] == arguments[:-1]).all(axis=1)
+    read = Facts(_joined(columns.database), _joined(columns.arguments), _joined(columns.truth))
+    facts, again, order = ordered(read, sizes)
     where = _Places(columns, order)
-    for i in np.flatnonzero(again & (truth != np.roll(truth, 1)))[:MOST_MISTAKES].tolist():
+    for i in np.flatnonzero(again & (facts.truth != np.roll(facts.truth, 1)))[:MOST_MISTAKES].tolist():
         first, second = where.spans([i - 1, i], reading.sources)
         message = f"this fact about {predicate.name} contradicts the one at {first.place}"
         hint = "an atom is true or false; remove one of the two"
         reading.mistakes.append(Diagnostic("E304", message, second, hint))
-    kept = np.flatnonzero(~again)
-    if len(kept) < len(again):
-        database, arguments, truth = database[kept], arguments[kept], truth[kept]
-    facts = Facts(database, arguments, truth)
+    kept = np.flatnonzero(~again) if again.any() else None
+    if kept is not None:
+        facts = Facts(facts.database[kept], facts.arguments[kept], facts.truth[kept])
     if predicate.value is not None:
         for pair in _second_values(predicate, facts):
-            first, second = where.spans(kept[pair].tolist(), reading.sources)
+            first, second = where.spans(pair if kept is None else kept[pair], reading.sources)
             some = "exactly one value is" if predicate.marker == "!" else "at most one value can be"
             message = f"this is a second value; the first is at {first.place}"
             reading.mistakes.append(Diagnostic("E305", message, second, f"of {predicate}, {some} true"))
     return facts
+
+
+def _joined(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,39 +301,13 @@ class _Places:
     columns: _Columns
     order: Callable[[], NDArray[np.int64]]
 
-    def spans(self, rows: Sequence[int], sources: Sequence[Source]) -> list[Span]:
+    def spans(self, rows: Sequence[int] | NDArray[np.int64], sources: Sequence[Source]) -> list[Span]:
         """The places of some of them, the first one first."""
         found = []
         for row in self.order()[rows].tolist():
             file, offset = place(self.columns, row)
             found.append(_fact_span(sources[file], offset))
         return sorted(found, key=lambda s: (s.source.name, s.start))
-
-
-def _ranked(
-    database: NDArray[np.int32], arguments: NDArray[np.int32], truth: NDArray[np.bool_], sizes: Sequence[int]
-) -> tuple[Facts, Callable[[], NDArray[np.int64]]]:
-    """Facts in order of database and arguments, and what tells, if it is asked, the row that each came from.
-
-    Rows become numbers of one mixed radix, as long as these fit into 64 bits: they sort several times as fast.
-    """
-    if 2 * int(database.max(initial=0) + 1) * math.prod(sizes) >= 2**63:
-        order = np.lexsort((*reversed(arguments.T), database))
-        return Facts(database[order], arguments[order], truth[order]), lambda: order
-    number = database.astype(np.int64)
-    for column, size in zip(arguments.T, sizes, strict=True):
-        number = number * size + column
-    number = 2 * number + truth
-    if (number[1:] > number[:-1]).all():
-        return Facts(database, arguments, truth), lambda: np.arange(len(number))
-    rest = np.sort(number)
-    found, ordered = (rest & 1).astype(np.bool_), np.empty_like(arguments)
-    rest >>= 1
-    for i in reversed(range(len(sizes))):
-        quotient = rest // sizes[i]
-        ordered[:, i] = rest - quotient * sizes[i]
-        rest = quotient
-    return Facts(rest.astype(np.int32), ordered, found), lambda: np.argsort(number, kind="stable")
 
 
 def _second_values(predicate: Predicate, facts: Facts) -> NDArray[np.int64]:
@@ -344,10 +336,13 @@ def _present(
         present[name][start:stop, ids] = True
     for predicate in model.predicates.values():
         table = facts[predicate.name]
-        for i, name in enumerate(predicate.types):
-            present[name].reshape(-1)[table.database * np.int64(len(types[name].constants)) + table.arguments[:, i]] = (
-                True
-            )
+        for block in blocks(len(table.truth)):
+            database = table.database[block]
+            for name, column in zip(predicate.types, table.arguments[block].T, strict=True):
+                if database[0] == database[-1]:
+                    present[name][database[0]][column] = True
+                else:
+                    present[name][database, column] = True
         if predicate.name in reading.soft:
             soft = reading.soft[predicate.name].facts()
             for i, name in enumerate(predicate.types):

@@ -44,7 +44,7 @@ def load(source: Source, chain: tuple[str, ...] = ()) -> File:
     """The file of a source, with all that it includes; `chain` holds the real paths of the files that led here."""
     code, mistakes = strip_comments(source)
     included: dict[int, tuple[str, File | None]] = {}
-    if "#include" in code.text:
+    if "#" in code.text and "#include" in code.text:
         chain = (*chain, _real(source.name))
         for match in _INCLUDE.finditer(code.text):
             path = match[1] if match[1] is not None else match[2]

@@ -49,7 +49,7 @@ _VISIBLE = re.compile(r"[^\n]")
 def strip_comments(source: Source) -> tuple[Code, list[Diagnostic]]:
     """The code of a source, and a mistake if a comment is never closed."""
     text = source.text
-    if "//" not in text and "/*" not in text:
+    if "/" not in text or ("//" not in text and "/*" not in text):  # one sign is looked for ten times as fast
         return Code(source, text), []
     code = _COMMENT_OR_QUOTE.sub(lambda m: m[0] if m[0][0] == '"' else _VISIBLE.sub(" ", m[0]), text)
     return Code(source, code), list(_unclosed(source)) if "/*" in text else []

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.source import Source
-from mlnlite.syntax.coded import Codes, coded
+from mlnlite.syntax.coded import Coded, Codes
 from mlnlite.syntax.facts import FactTable
 
 Number = TypeVar("Number", bound=np.generic)
@@ -131,7 +131,7 @@ def _table(key: _Key, pieces: Sequence[Piece], names: Sequence[str]) -> FactTabl
 
     return FactTable(
         predicate,
-        tuple(coded(whole([p.words[i] for p in pieces]), names) for i in range(arity)),
+        tuple(Coded(names, whole([p.words[i] for p in pieces])) for i in range(arity)),
         whole([p.truth for p in pieces]),
         whole([p.database for p in pieces]),
         whole([p.weight for p in pieces if p.weight is not None]) if soft else None,

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mlnlite as ml
-from mlnlite.model.facts import _ranked
+from mlnlite.model.evidence import Facts
+from mlnlite.model.order import ordered
 
 rows = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 3), st.integers(0, 4), st.booleans()), max_size=30)
 
@@ -17,13 +18,17 @@ rows = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 3), st.integers(0, 4
 def test_order(facts):
     database, first, second = (np.array([f[i] for f in facts], np.int32) for i in range(3))
     arguments, truth = np.column_stack([first, second]), np.array([f[3] for f in facts], np.bool_)
-    small, order = _ranked(database, arguments, truth, [4, 5])
-    large, slow = _ranked(database, arguments, truth, [2**31, 2**31])
-    expected = sorted(facts)
+    given, expected = Facts(database, arguments, truth), sorted(facts)
+    repeated = [i > 0 and fact[:3] == expected[i - 1][:3] for i, fact in enumerate(expected)]
+    small, again, order = ordered(given, [4, 5])
     assert list(zip(small.database, *small.arguments.T, small.truth, strict=True)) == expected
     assert [facts[i] for i in order()] == expected
+    assert again.tolist() == repeated
+    large, again, order = ordered(given, [2**31, 2**31])
     assert [f[:3] for f in zip(large.database, *large.arguments.T, strict=True)] == [f[:3] for f in expected]
-    assert [facts[i][:3] for i in slow()] == [f[:3] for f in expected]
+    assert [facts[i][:3] for i in order()] == [f[:3] for f in expected]
+    assert again.tolist() == repeated
+    assert ordered(small, [4, 5])[0] is small
 
 
 def test_places_of_contradictions():
