@@ -119,25 +119,30 @@ def _piece(key: _Key, rows: _Single, numbers: dict[str, int]) -> Piece:
     )
 
 
-def _table(key: _Key, pieces: Sequence[Piece], names: Sequence[str]) -> FactTable:
-    """Facts as a table, in their order; `names`: of the words."""
+def _table(key: _Key, pieces: list[Piece], names: Sequence[str]) -> FactTable:
+    """Facts as a table, in their order; `names`: of the words. Each column goes when it has become part of the table."""
     source, predicate, arity, soft = key
-    offset = np.concatenate([p.offset for p in pieces])
-    order = np.argsort(offset) if (offset[1:] < offset[:-1]).any() else slice(None)
-
-    def whole(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
-        joined: NDArray[Number] = np.concatenate(parts)
-        return joined[order]
-
+    words = [[piece.words[i] for piece in pieces] for i in range(arity)]
+    truth, database = [piece.truth for piece in pieces], [piece.database for piece in pieces]
+    offset, weight = [piece.offset for piece in pieces], [piece.weight for piece in pieces if piece.weight is not None]
+    pieces.clear()
+    offsets = _joined(offset)
+    order = np.argsort(offsets) if (offsets[1:] < offsets[:-1]).any() else slice(None)
     return FactTable(
         predicate,
-        tuple(Coded(names, whole([p.words[i] for p in pieces])) for i in range(arity)),
-        whole([p.truth for p in pieces]),
-        whole([p.database for p in pieces]),
-        whole([p.weight for p in pieces if p.weight is not None]) if soft else None,
-        offset[order],
+        tuple(Coded(names, _joined(column)[order]) for column in words),
+        _joined(truth)[order],
+        _joined(database)[order],
+        _joined(weight)[order] if soft else None,
+        offsets[order],
         source,
     )
+
+
+def _joined(parts: list[NDArray[Number]]) -> NDArray[Number]:
+    whole: NDArray[Number] = np.concatenate(parts)
+    parts.clear()
+    return whole
 
 
 def log_odds(probability: float) -> float:
