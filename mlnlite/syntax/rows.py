@@ -120,7 +120,7 @@ def _piece(key: _Key, rows: _Single, numbers: dict[str, int]) -> Piece:
 
 
 def _table(key: _Key, pieces: list[Piece], names: Sequence[str]) -> FactTable:
-    """Facts as a table, in their order; `names`: of the words. Each column goes when it has become part of the table."""
+    """Facts as a table, in their order; `names`: of the words. Columns of pieces go when they are part of the table."""
     source, predicate, arity, soft = key
     words = [[piece.words[i] for piece in pieces] for i in range(arity)]
     truth, database = [piece.truth for piece in pieces], [piece.database for piece in pieces]
