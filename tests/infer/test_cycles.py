@@ -93,3 +93,10 @@ def test_what_is_not_proved_has_a_gap():
     longer = map_of(network, time_limit=2.0)
     assert best.log_weight <= longer.bound + 1e-9
     assert longer.log_weight <= best.bound + 1e-9
+
+
+def test_what_is_forbidden_is_left_to_others():
+    part = frustrated(0, 20, 50)
+    hard = Cells(np.array([[0, 1]], np.int32), np.array([[1, 0]], np.int32), np.array([-np.inf]))
+    assert pairs_of(part) is not None
+    assert pairs_of(Part(0, part.variables, part.cardinality, (*part.cells, hard))) is None

@@ -55,7 +55,7 @@ class Pairs:
 def pairs_of(part: Part) -> Pairs | None:
     """A component as pairs; None if it is not of that kind."""
     function = quadratic(part)
-    if function is None:
+    if function is None or any(np.isneginf(c.amount).any() for c in part.cells):
         return None
     n, m = len(part.variables), len(function.first)
     product = function.product / (2 * function.scale)
