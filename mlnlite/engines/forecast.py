@@ -64,8 +64,9 @@ def estimate(plan: Plan, tables: Tables) -> Estimate:
         values = tables[table][column]
         values = values[:: max(1, len(values) // SAMPLE)]
         low = int(values.min(initial=0))
-        seen = np.zeros(min(int(values.max(initial=0)) - low + 1, DENSEST), np.bool_)
-        seen[(values - low) % len(seen)] = True
+        width = int(values.max(initial=0)) - low + 1
+        seen = np.zeros(min(width, DENSEST), np.bool_)
+        seen[values - low if width <= DENSEST else (values - low) % DENSEST] = True
         return float(np.count_nonzero(seen))
 
     return _estimate(plan, tables, n_distinct)

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Column: TypeAlias = NDArray[np.int64] | NDArray[np.int32]
+Column: TypeAlias = NDArray[np.int64] | NDArray[np.int32] | NDArray[np.int8]
 Relation: TypeAlias = Mapping[str, NDArray[Any]]
 """Columns of integers of equal length, by name."""
 
@@ -143,7 +143,7 @@ def columns_of(plan: Plan) -> tuple[str, ...]:
 
 
 Run: TypeAlias = Callable[[Plan], Relation]
-"""Gives all rows of a plan as columns of integers of 32 or 64 bits, in any order."""
+"""Gives all rows of a plan as columns of signed integers, in any order."""
 
 
 class Engine(Protocol):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.ground.compile import strides
-from mlnlite.ground.merge import code_of, merged, merged_codes
+from mlnlite.ground.merge import Bounds, Factors, code_of, merged, merged_codes
 from mlnlite.ground.network import Clauses, Counts, Network, Tables
 from mlnlite.ground.residual import ClauseShape, CountShape, TableShape
 from mlnlite.ground.states import counts_of
@@ -45,19 +45,24 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a template gives: its open ground formulas, and for each row the numbers of groundings that are decided."""
+    """What a template gives.
+
+    Attributes:
+        pieces: its open ground formulas.
+        decided_true: for each row the number of groundings that evidence makes true.
+        decided_false: false.
+        n_open: leaves open.
+    """
 
     pieces: tuple[Piece, ...]
     decided_true: Int64
     decided_false: Int64
+    n_open: Int64
 
     @property
     def n_groundings(self) -> Int64:
         """Number of groundings of each row."""
-        total = self.decided_true + self.decided_false
-        for piece in self.pieces:
-            total = total + sums_by(piece.row, piece.count, len(total))
-        return total
+        return self.decided_true + self.decided_false + self.n_open
 
 
 def sums_by(row: NDArray[Any], count: Int64, n_rows: int) -> Int64:
@@ -91,13 +96,13 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         value=value,
         cardinality=cardinality,
         block=is_block,
-        clauses=_clauses(parts, first, index),
-        tables=_tables(parts, first, index),
+        clauses=_clauses(parts, first, index, len(atoms)),
+        tables=_tables(parts, first, index, len(atoms)),
         weights=np.concatenate([np.empty(0), *(t.weights for t in model.templates)]),
         template=np.repeat(np.arange(len(parts), dtype=np.int32), sizes),
         decided_true=np.concatenate([np.empty(0, np.int64), *(part.decided_true for part in parts)]),
         n_groundings=np.concatenate([np.empty(0, np.int64), *(part.n_groundings for part in parts)]),
-        counts=_counts(parts, first, index),
+        counts=_counts(parts, first, index, len(atoms)),
     )
     _lock(network)
     return network
@@ -140,7 +145,7 @@ def index_in(atoms: Int64) -> Index:
         return lambda numbers: (numbers - low).astype(np.int32, copy=False)
     place = np.zeros(span, np.int32)
     place[atoms - low] = np.arange(len(atoms), dtype=np.int32)
-    return lambda numbers: place[numbers - low if low else numbers]
+    return lambda numbers: place.take(numbers - low if low else numbers, mode="clip")
 
 
 def known_atoms(predicate: Predicate, evidence: Evidence) -> Int64:
@@ -227,13 +232,16 @@ def _may_be_none(first: Int64, is_block: NDArray[np.bool_], evidence: Evidence) 
 
 # --- factors
 
+Weighted: TypeAlias = list[tuple[Piece, int]]
+"""Pieces, and the index of the weight of each one's row 0."""
 
-def _clauses(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Clauses, ...]:
+
+def _clauses(parts: Sequence[Part], first: Int64, index: Index, n_atoms: int) -> tuple[Clauses, ...]:
     found = _of_kind(parts, first, ClauseShape, lambda shape: (len(shape.atoms), shape.negated))
     blocks = []
-    for (_, negated), pieces in sorted(found.items()):
-        codes = ((_codes(p, index), weight, p.count) for p, weight in pieces)
-        blocks.append(Clauses(*merged_codes(codes), negated))
+    for (k, negated), pieces in sorted(found.items()):
+        codes = ((_codes(p, index), _weights(p, offset), p.count) for p, offset in pieces)
+        blocks.append(Clauses(*merged_codes(codes, _bounds(pieces, k, 2 * n_atoms + 2, first)), negated))
     return tuple(blocks)
 
 
@@ -242,30 +250,40 @@ def _codes(piece: Piece, index: Index) -> list[Int32]:
     return [code_of(index(a), sign) for a, sign in zip(piece.atoms, piece.shape.signs, strict=True)]
 
 
-def _tables(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Tables, ...]:
+def _weights(piece: Piece, offset: int) -> Int32:
+    return (piece.row + offset).astype(np.int32)
+
+
+def _bounds(pieces: Weighted, k: int, number: int, first: Int64) -> Bounds:
+    return Bounds(sum(len(p.row) for p, _ in pieces), k, number, int(first[-1]))
+
+
+def _tables(parts: Sequence[Part], first: Int64, index: Index, n_atoms: int) -> tuple[Tables, ...]:
     found = _of_kind(parts, first, TableShape, lambda shape: (shape.truth.ndim, shape.truth.tobytes()))
     blocks = []
-    for (n_atoms, truth), pieces in sorted(found.items()):
-        rows, weight, count = merged(([index(a) for a in p.atoms], weight, p.count) for p, weight in pieces)
-        blocks.append(Tables(rows, np.frombuffer(truth, np.bool_).reshape((2,) * n_atoms), weight, count))
+    for (k, truth), pieces in sorted(found.items()):
+        rows, weight, count = _merged(pieces, index, _bounds(pieces, k, n_atoms, first))
+        blocks.append(Tables(rows, np.frombuffer(truth, np.bool_).reshape((2,) * k), weight, count))
     return tuple(blocks)
 
 
-def _counts(parts: Sequence[Part], first: Int64, index: Index) -> tuple[Counts, ...]:
+def _counts(parts: Sequence[Part], first: Int64, index: Index, n_atoms: int) -> tuple[Counts, ...]:
     found = _of_kind(parts, first, CountShape, lambda shape: shape)
     return tuple(
-        counts_of(shape, *merged(([index(a) for a in p.atoms], weight, p.count) for p, weight in pieces))
+        counts_of(shape, *_merged(pieces, index, _bounds(pieces, len(shape.steps), n_atoms, first)))
         for shape, pieces in found.items()
     )
 
 
-def _of_kind(
-    parts: Sequence[Part], first: Int64, kind: type[S], key: Callable[[S], K]
-) -> dict[K, list[tuple[Piece, Int32]]]:
-    """The pieces with a kind of shape, and their weights, by a key of their shapes."""
-    found: dict[K, list[tuple[Piece, Int32]]] = {}
-    for part, offset in zip(parts, first, strict=False):
+def _merged(pieces: Weighted, index: Index, bounds: Bounds) -> Factors:
+    return merged((([index(a) for a in p.atoms], _weights(p, offset), p.count) for p, offset in pieces), bounds)
+
+
+def _of_kind(parts: Sequence[Part], first: Int64, kind: type[S], key: Callable[[S], K]) -> dict[K, Weighted]:
+    """The pieces with a kind of shape, by a key of their shapes."""
+    found: dict[K, Weighted] = {}
+    for part, offset in zip(parts, first.tolist(), strict=False):
         for piece in part.pieces:
             if isinstance(piece.shape, kind):
-                found.setdefault(key(piece.shape), []).append((piece, (piece.row + offset).astype(np.int32)))
+                found.setdefault(key(piece.shape), []).append((piece, offset))
     return found

@@ -229,10 +229,8 @@ def part_of(source: Source, planned: TemplatePlan, run: Run, tables: Tables) -> 
             return None
         _add(tally, source, plan, rows, groups)
     total = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
-    unlisted = total - tally.open - tally.true - tally.false
-    if planned.lists_true:
-        return Part(tuple(tally.pieces), tally.true, tally.false + unlisted)
-    return Part(tuple(tally.pieces), tally.true + unlisted, tally.false)
+    true = tally.true if planned.lists_true else total - tally.open - tally.false
+    return Part(tuple(tally.pieces), true, total - tally.open - true, tally.open)
 
 
 def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Run, tables: Tables) -> Part | None:
@@ -297,7 +295,7 @@ def _constant(source: Source, template: Template, *, truth: bool) -> Part:
     none = np.zeros_like(every)
     if template.hard and not truth:
         raise _violated(template, "")
-    return Part((), every, none) if truth else Part((), none, every)
+    return Part((), every, none, none) if truth else Part((), none, every, none)
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,17 +311,17 @@ class _Tally:
 def _add(tally: _Tally, source: Source, plan: Compiled, rows: Relation, groups: Sequence[Group]) -> None:
     """Adds groups of rows to a tally."""
     n_rows = len(next(iter(rows.values()))) if rows else 1
-    row = rows["row"] if source.tabled else np.broadcast_to(np.int32(0), n_rows)
-    count = rows["count"] if plan.counted else np.broadcast_to(np.int64(1), n_rows)
     for group in groups:
-        mine, times = row[group.index], count[group.index]
-        sums = sums_by(mine, times, source.n_rows)
+        n = n_rows if isinstance(group.index, slice) else len(group.index)
+        row = rows["row"][group.index] if source.tabled else np.broadcast_to(np.int32(0), n)
+        count = rows["count"][group.index] if plan.counted else np.broadcast_to(np.int64(1), n)
+        sums = sums_by(row, count, source.n_rows)
         if isinstance(group.shape, Decided):
             decided = tally.true if group.shape.truth else tally.false
             np.add(decided, sums, out=decided)
             continue
         np.add(tally.open, sums, out=tally.open)
-        tally.pieces.append(Piece(group.atoms, group.shape, mine, times))
+        tally.pieces.append(Piece(group.atoms, group.shape, row, count))
 
 
 def groundings_of_a_row(source: Source) -> int:

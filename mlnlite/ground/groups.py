@@ -60,9 +60,13 @@ def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
         known, merged = _meaning({key: int(column[first]) for key, column in features.items()})
         body = simplified(renamed(formula.body, merged), {**plan.known, **known})
         shape = shape_of(body)
-        atoms = () if isinstance(shape, Decided) else tuple(rows[atom_column(i)][index] for i in shape.atoms)
+        atoms = () if isinstance(shape, Decided) else tuple(_taken(rows[atom_column(i)], index) for i in shape.atoms)
         groups.append(Group(index, shape, atoms))
     return groups
+
+
+def _taken(column: Int64, index: Int64 | slice) -> Int64:
+    return column[index] if isinstance(index, slice) else column.take(index, mode="clip")
 
 
 def _equal_rows(code: NDArray[Any_], base: int) -> Sequence[Int64 | slice]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,23 @@ Factors = tuple[Int32, Int32, Int64]
 """Rows of shape (n, k), and for each row its weight and its count."""
 
 
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What pieces have together.
+
+    Attributes:
+        n: number of rows.
+        k: numbers in a row.
+        number: all numbers are less than this.
+        weight: and so are weights less than this.
+    """
+
+    n: int
+    k: int
+    number: int
+    weight: int
+
+
 def merged_clauses(literals: Sequence[Int32], weight: Int32, count: Int64) -> Factors:
     """Clauses with equal literals and weights made one, the literals of each in rising order of their atoms.
 
@@ -28,7 +46,10 @@ def merged_clauses(literals: Sequence[Int32], weight: Int32, count: Int64) -> Fa
         weight: shape (n,).
         count: shape (n,).
     """
-    return merged_codes([([(np.abs(c) << 1) | (c < 0) for c in literals], weight, count)])
+    codes = [(np.abs(c) << 1) | (c < 0) for c in literals]
+    number = max((int(c.max(initial=0)) for c in codes), default=0) + 1
+    bounds = Bounds(len(weight), len(codes), number, int(weight.max(initial=0)) + 1)
+    return merged_codes([(codes, weight, count)], bounds)
 
 
 def code_of(index: Int32, positive: bool) -> Int32:
@@ -36,48 +57,55 @@ def code_of(index: Int32, positive: bool) -> Int32:
     return np.asarray((index << np.int32(1)) + np.int32(2 if positive else 3))
 
 
-def merged_codes(pieces: Iterable[Piece]) -> Factors:
+def merged_codes(pieces: Iterable[Piece], bounds: Bounds) -> Factors:
     """As `merged_clauses`, of clauses in pieces, whose literals are given by their codes; see `code_of`."""
-    rows, weight, count = _merged([(_sorted_rows(list(codes)), w, n) for codes, w, n in pieces])
+    rows, weight, count = _merged(((_sorted_rows(list(codes)), w, n) for codes, w, n in pieces), bounds)
     for start in range(0, len(rows), CHUNK):
         chunk = rows[start : start + CHUNK]
-        negative = (chunk & np.int32(1)).astype(np.bool_)
+        negative = -(chunk & np.int32(1))
         chunk >>= np.int32(1)
-        np.negative(chunk, out=chunk, where=negative)
+        chunk ^= negative  # two's complement: where negative is -1 this and the next line change the sign
+        chunk -= negative
     return _locked(rows, weight, count)
 
 
-def merged(pieces: Iterable[Piece]) -> Factors:
+def merged(pieces: Iterable[Piece], bounds: Bounds) -> Factors:
     """Rows in pieces, with equal numbers (not negative) and equal weights made one."""
-    return _locked(*_merged(list(pieces)))
+    return _locked(*_merged(pieces, bounds))
 
 
-def _merged(pieces: list[Piece]) -> Factors:
-    k = len(pieces[0][0])
-    bits = max(int(c.max(initial=0)) for columns, _, _ in pieces for c in columns).bit_length() if k else 0
-    if bits * k + max(int(w.max(initial=0)) for _, w, _ in pieces).bit_length() > 62:
-        columns = [np.concatenate([p[0][i] for p in pieces]) for i in range(k)]
-        return _merged_by_columns(columns, *(np.concatenate([p[i] for p in pieces]) for i in (1, 2)))
-    plain = all(int(n.max(initial=1)) == 1 for _, _, n in pieces)
-    key = np.concatenate([_packed(columns, weight, bits) for columns, weight, _ in pieces])
-    key, count = _added(key, None if plain else np.concatenate([n for _, _, n in pieces]))
-    rows, weight = np.empty((len(key), k), np.int32), np.empty(len(key), np.int32)
+def _merged(pieces: Iterable[Piece], bounds: Bounds) -> Factors:
+    bits = (bounds.number - 1).bit_length()
+    if bits * bounds.k + (bounds.weight - 1).bit_length() > 62:
+        return _merged_by_columns(list(pieces), bounds)
+    key = np.empty(bounds.n, np.int64)
+    counts, at = [], 0
+    for columns, weight, count in pieces:
+        part = key[at : at + len(weight)]
+        part[:] = weight
+        for column in columns:
+            part <<= bits
+            part |= column
+        counts.append(count)
+        at += len(weight)
+    plain = all(int(n.max(initial=1)) == 1 for n in counts)
+    key, count = _added(key, None if plain else np.concatenate(counts))
+    return *_unpacked(key, bounds.k, bits), count
+
+
+def _unpacked(key: Int64, k: int, bits: int) -> tuple[Int32, Int32]:
+    """The rows and the weights that keys stand for. Changes the keys."""
+    rows = key.view(np.int32).reshape(-1, 2) if k == 2 else np.empty((len(key), k), np.int32)
+    weight = np.empty(len(key), np.int32)
+    mask = (1 << bits) - 1
     for start in range(0, len(key), CHUNK):
         chunk = slice(start, start + CHUNK)
-        part = key[chunk]
+        part = key[chunk].copy()  # two numbers take the place of their key
         for i in reversed(range(k)):
-            rows[chunk, i] = part & ((1 << bits) - 1)
+            rows[chunk, i] = part & mask
             part >>= bits
         weight[chunk] = part
-    return rows, weight, count
-
-
-def _packed(columns: Sequence[Int32], weight: Int32, bits: int) -> Int64:
-    key = weight.astype(np.int64)
-    for column in columns:
-        key <<= bits
-        key |= column
-    return key
+    return rows, weight
 
 
 def _added(key: Int64, count: Int64 | None) -> tuple[Int64, Int64]:
@@ -95,7 +123,9 @@ def _added(key: Int64, count: Int64 | None) -> tuple[Int64, Int64]:
     return key[starts], np.diff(starts, append=len(key)) if count is None else np.add.reduceat(count, starts)
 
 
-def _merged_by_columns(columns: Sequence[Int32], weight: Int32, count: Int64) -> Factors:
+def _merged_by_columns(pieces: list[Piece], bounds: Bounds) -> Factors:
+    columns = [np.concatenate([p[0][i] for p in pieces]) for i in range(bounds.k)]
+    weight, count = (np.concatenate([p[i] for p in pieces]) for i in (1, 2))
     order = np.lexsort((*reversed(columns), weight))
     rows, weight, count = np.column_stack(columns)[order], weight[order], count[order]
     new = np.ones(len(order), bool)

@@ -27,11 +27,11 @@ def tables_of(evidence: Evidence) -> Tables:
     """The stored tables of all predicates and types."""
     tables: dict[str, tuple[Column, ...]] = {"worlds": (np.arange(evidence.n_databases, dtype=np.int32),)}
     for name, facts in evidence.facts.items():
-        columns = tuple(np.ascontiguousarray(c) for c in (facts.database, *facts.arguments.T))
+        columns = (facts.database, *facts.arguments.T)
         every = bool(facts.truth.all())
         tables[f"{name}.true"] = columns if every else tuple(c[facts.truth] for c in columns)
         tables[f"{name}.false"] = tuple(c[:0] if every else c[~facts.truth] for c in columns)
-        tables[f"{name}.known"] = (*columns, np.where(facts.truth, KNOWN_TRUE, KNOWN_FALSE).astype(np.int32))
+        tables[f"{name}.known"] = (*columns, np.where(facts.truth, np.int8(KNOWN_TRUE), np.int8(KNOWN_FALSE)))
     for name, present in evidence.present.items():
         database, constant = np.nonzero(present)
         tables[f"type:{name}"] = (database.astype(np.int32), constant.astype(np.int32))

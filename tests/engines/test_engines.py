@@ -76,6 +76,30 @@ def test_parts_together_are_the_whole(tables, chunk):
         assert sum(whole.values()) <= max(1, most_rows(plan, tables)) * (2 if isinstance(plan, Union) else 1)
 
 
+NARROW = {"r": (np.array([1, 1, 0, 5]), np.array([2, 3, 2, 2])), "s": (np.array([1, 1]), np.array([2, 7]))}
+SPARSE = {"r": (np.array([1, 10**12, 1]), np.array([2, 3, 9]), np.array([10**12, 4, 4])), "s": (np.array([1]),) * 3}
+SPARSE["s"] = tuple(np.array([c[0], c[1], 7]) for c in SPARSE["r"])
+
+
+@pytest.mark.parametrize("engine", [NumpyEngine(), DuckDBEngine()])
+def test_values_that_the_other_table_lacks_match_nothing(engine):
+    run, same = engine.load(NARROW), Scan("s", ("x", "y"))
+    assert rows_of(run, AntiJoin(R, same)) == Counter([(1, 3), (0, 2), (5, 2)])
+    assert rows_of(run, Join(R, same)) == Counter([(1, 2)])
+    assert sorted(run(Lookup(R, "s", ("x",), "n", -1))["n"].tolist())[:2] == [-1, -1]
+
+
+@pytest.mark.parametrize("engine", [NumpyEngine(), DuckDBEngine()])
+def test_keys_of_more_than_64_bits(engine):
+    run = engine.load(SPARSE)
+    whole, other = Scan("r", ("x", "y", "z")), Scan("s", ("x", "y", "z"))
+    every = set(zip(*(c.tolist() for c in SPARSE["r"]), strict=True))
+    shared = every & set(zip(*(c.tolist() for c in SPARSE["s"]), strict=True))
+    assert set(rows_of(run, Join(whole, other))) == shared
+    assert set(rows_of(run, AntiJoin(whole, other))) == every - shared
+    assert len(shared) == 2
+
+
 def test_duckdb_reads_parts_too():
     tables = {"r": (np.arange(100), np.arange(100) % 7), "s": (np.arange(7), np.arange(7) * 2)}
     run = DuckDBEngine().load(tables)
