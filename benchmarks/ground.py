@@ -1,8 +1,9 @@
 """Times grounding against size and prints a table: `python benchmarks/ground.py [largest number of people]`.
 
-Each row is a process of its own, with compiled bytecode as in an installed package: CPU seconds and wall seconds of `ground`, CPU seconds of
-the whole process, making the input included. The exponent is fitted to CPU seconds over the sizes; ground formulas a second beyond start-up
-are those by which the largest input exceeds the smallest, over the CPU seconds of `ground` by which it does.
+Each row is a process of its own, with compiled bytecode as in an installed package: CPU and wall seconds of `ground`,
+CPU seconds of the whole process, making the input included. The exponent is fitted to CPU seconds over the sizes; ground
+formulas a second beyond start-up are those by which the largest input exceeds the smallest, over the CPU seconds of
+`ground` by which it does.
 """
 
 from __future__ import annotations
