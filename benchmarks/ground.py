@@ -1,9 +1,9 @@
 """Times grounding against size and prints a table: `python benchmarks/ground.py [largest number of people]`.
 
 Each row is a process of its own, with compiled bytecode as in an installed package: CPU and wall seconds of `ground`,
-CPU seconds of the whole process, making the input included. The exponent is fitted to CPU seconds over the sizes; ground
-formulas a second beyond start-up are those by which the largest input exceeds the smallest, over the CPU seconds of
-`ground` by which it does.
+CPU seconds of the whole process, making the input included. The exponent is fitted to CPU seconds over the sizes;
+ground formulas a second beyond start-up are those by which the largest input exceeds the smallest, over the CPU
+seconds of `ground` by which it does.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def friends(n):
     pairs.sort()  # np.unique, which hashes, takes a minute here
     pairs = pairs[np.append(True, pairs[1:] != pairs[:-1])]
     pairs = np.stack(np.divmod(pairs, n), 1).astype(np.int32)
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    pairs = np.asfortranarray(pairs[pairs[:, 0] != pairs[:, 1]])  # as facts that are read
     known = np.sort(rng.choice(n, n // 10, replace=False)).astype(np.int32)[:, None]
     zeros = lambda k: np.zeros(k, np.int32)  # noqa: E731
     facts = {

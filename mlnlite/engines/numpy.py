@@ -6,6 +6,7 @@ sparse for that are sorted. Columns keep their width: what is stored in 32 bits 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,9 +35,13 @@ from mlnlite.engines.plan import (
 Column = NDArray[Any]
 Bool = NDArray[np.bool_]
 Int64 = NDArray[np.int64]
+_Found = tuple[Column, int]
 
 MOST_DICTIONARIES = 16
 """Dictionaries that are kept for other plans."""
+
+MANY = 1000
+"""How many times as many rows are worth a look at what they can match."""
 
 
 class TooManyRowsError(Exception):
@@ -81,6 +86,10 @@ class _Rows:
         """The rows of a mask."""
         return self if mask.all() else self.take(np.flatnonzero(mask))
 
+    def values(self, names: Sequence[str]) -> list[Column]:
+        """Some of the columns."""
+        return [self.columns[name] for name in names]
+
     def value(self, side: str | int) -> Column:
         """A column, or a constant as one."""
         kind = np.int32 if isinstance(side, int) and abs(side) < 2**31 else np.int64
@@ -98,17 +107,19 @@ class _Store:
     most: int | None
     dictionaries: dict[tuple[Plan, tuple[str, ...]], Dictionary]
 
-    def dictionary(self, relation: Plan, by: tuple[str, ...], values: Column | None, n_others: int) -> Dictionary:
-        """The numbers of a relation's rows by some of its columns; None: 0 for each."""
-        found = self.dictionaries.get((relation, by))
-        if found is None:
+    def look_up(self, relation: Plan, by: tuple[str, ...], values: Column | None, others: list[Column]) -> _Found:
+        """The numbers that a relation's rows with some columns have (None: 0), for other rows; and that of no row."""
+        known = self.dictionaries.get((relation, by))
+        if known is None:
             rows = _run(relation, self)
-            values = np.zeros(rows.n, np.int8) if values is None else values
-            found = dictionary([rows.columns[c] for c in by], values, n_others)
-            if len(self.dictionaries) >= MOST_DICTIONARIES:
-                self.dictionaries.clear()
-            self.dictionaries[relation, by] = found
-        return found
+            rows = _Rows({**rows.columns, "": np.zeros(rows.n, np.int8) if values is None else values}, rows.n)
+            few = _near(rows, by, others)
+            known = dictionary([few.columns[c] for c in by], few.columns[""], len(others[0]))
+            if few is rows:
+                if len(self.dictionaries) >= MOST_DICTIONARIES:
+                    self.dictionaries.clear()
+                self.dictionaries[relation, by] = known
+        return known.find(others), known.absent
 
 
 def _run(plan: Plan, store: _Store) -> _Rows:
@@ -183,7 +194,8 @@ def _join(left: _Rows, right: _Rows, most: int | None) -> _Rows:
         _verify(left.n * right.n, most)
         left_index = None if right.n == 1 else np.repeat(np.arange(left.n), right.n)
         return _paired(left, left_index, right, np.tile(np.arange(right.n), left.n))
-    sides = [[rows.columns[c] for c in shared] for rows in (left, right)]
+    left, right = _near(left, shared, right.values(shared)), _near(right, shared, left.values(shared))
+    sides = [left.values(shared), right.values(shared)]
     packing = packing_of(sides[1])
     stored, _ = packing.keys(sides[1])
     if right.n <= left.n or _rising(stored):
@@ -192,6 +204,18 @@ def _join(left: _Rows, right: _Rows, most: int | None) -> _Rows:
     packing = packing_of(sides[0])
     index = _matches(sides[1], packing.keys(sides[0])[0], packing, most)
     return _paired(right, index[0], left, index[1])
+
+
+def _near(rows: _Rows, by: Sequence[str], others: list[Column]) -> _Rows:
+    """The rows without many that match none of some other rows, if these are few: values are outside of their range."""
+    if rows.n < MANY * max(len(others[0]), 1):
+        return rows
+    if not len(others[0]):
+        return rows.take(np.empty(0, np.int64))
+    inside = [
+        (rows.columns[c] >= other.min()) & (rows.columns[c] <= other.max()) for c, other in zip(by, others, strict=True)
+    ]
+    return rows.take(np.flatnonzero(np.logical_and.reduce(inside)))
 
 
 def _matches(others: list[Column], stored: Column, packing: Packing, most: int | None) -> tuple[Int64 | None, Int64]:
@@ -238,8 +262,8 @@ def _antijoin(left: _Rows, right: Plan, store: _Store) -> _Rows:
     shared = tuple(c for c in columns_of(right) if c in left.columns)
     if not shared:
         return left if _run(right, store).n == 0 else left.take(np.empty(0, np.int64))
-    present = store.dictionary(right, shared, None, left.n)
-    return left.keep(present.find([left.columns[c] for c in shared]) == present.absent)
+    found, absent = store.look_up(right, shared, None, [left.columns[c] for c in shared])
+    return left.keep(found == absent)
 
 
 def _lookup(plan: Lookup, rows: _Rows, store: _Store) -> _Rows:
@@ -250,9 +274,8 @@ def _lookup(plan: Lookup, rows: _Rows, store: _Store) -> _Rows:
     if not plan.key:
         return _Rows({**rows.columns, plan.name: np.full(rows.n, value[0], np.result_type(default, value))}, rows.n)
     key = tuple(f"k{i}" for i in range(len(plan.key)))
-    known = store.dictionary(Scan(plan.table, (*key, None)), key, value, rows.n)
-    found = known.find([rows.value(k) for k in plan.key])
-    found = np.where(found == known.absent, default, found)
+    found, absent = store.look_up(Scan(plan.table, (*key, None)), key, value, [rows.value(k) for k in plan.key])
+    found = np.where(found == absent, default, found)
     return _Rows({**rows.columns, plan.name: found}, rows.n)
 
 

@@ -2,45 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import Any, TypeAlias, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mlnlite.ground.blocks import Index, Piece, blocks_of
 from mlnlite.ground.compile import strides
-from mlnlite.ground.merge import Bounds, Factors, code_of, merged, merged_codes
-from mlnlite.ground.network import Clauses, Counts, Network, Tables
-from mlnlite.ground.residual import ClauseShape, CountShape, TableShape
-from mlnlite.ground.states import counts_of
+from mlnlite.ground.network import Network
+from mlnlite.model.change import find
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Predicate
 
-S = TypeVar("S")
-K = TypeVar("K")
-
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """Ground formulas of one template that have one shape.
-
-    Attributes:
-        atoms: for each of `shape.atoms` a column of atom numbers, shape (n,).
-        shape: clause, table, or function of counts.
-        row: shape (n,), row of the template.
-        count: shape (n,), how many groundings.
-    """
-
-    atoms: tuple[Int64, ...]
-    shape: ClauseShape | TableShape | CountShape
-    row: NDArray[Any]
-    count: Int64
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,13 +60,14 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         parts: one for each template.
         query: numbers of further atoms that are to be in the network unless they are known.
     """
-    asked = np.empty(0, np.int64) if query is None else _unknown(np.unique(query), evidence)
+    asked = np.empty(0, np.int64) if query is None else unknown(np.unique(query), evidence)
     touched = distinct([asked, *(a for part in parts for p in part.pieces for a in p.atoms)])
-    atoms, block = _with_blocks(touched, evidence)
+    atoms, block = with_blocks(touched, evidence)
     index = index_in(atoms)
-    variable, value, cardinality, is_block = _variables(atoms, block, evidence)
+    variable, value, cardinality, is_block = variables_of(atoms, block, evidence)
     first = np.cumsum([0, *(len(part.decided_true) for part in parts)])
-    sizes = np.diff(first)
+    pieces = [(p, offset) for part, offset in zip(parts, first.tolist(), strict=False) for p in part.pieces]
+    blocks = blocks_of(pieces, index, len(atoms), int(first[-1]))
     network = Network(
         model=model,
         evidence=evidence,
@@ -96,13 +76,13 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         value=value,
         cardinality=cardinality,
         block=is_block,
-        clauses=_clauses(parts, first, index, len(atoms)),
-        tables=_tables(parts, first, index, len(atoms)),
+        clauses=blocks.clauses,
+        tables=blocks.tables,
         weights=np.concatenate([np.empty(0), *(t.weights for t in model.templates)]),
-        template=np.repeat(np.arange(len(parts), dtype=np.int32), sizes),
+        template=np.repeat(np.arange(len(parts), dtype=np.int32), np.diff(first)),
         decided_true=np.concatenate([np.empty(0, np.int64), *(part.decided_true for part in parts)]),
         n_groundings=np.concatenate([np.empty(0, np.int64), *(part.n_groundings for part in parts)]),
-        counts=_counts(parts, first, index, len(atoms)),
+        counts=blocks.counts,
     )
     _lock(network)
     return network
@@ -117,8 +97,6 @@ def _lock(network: Network) -> None:
 
 DENSEST = 1 << 28
 """Atom numbers that a look-up table may span."""
-
-Index: TypeAlias = Callable[[Int64], Int32]
 
 
 def distinct(numbers: Sequence[Int64]) -> Int64:
@@ -149,11 +127,11 @@ def index_in(atoms: Int64) -> Index:
 
 
 def known_atoms(predicate: Predicate, evidence: Evidence) -> Int64:
-    """Numbers of the atoms of a predicate that are facts."""
+    """Numbers of the atoms of a predicate that are facts, rising."""
     return evidence.atom_number(predicate.name, evidence.facts[predicate.name].arguments)
 
 
-def _unknown(atoms: Int64, evidence: Evidence) -> Int64:
+def unknown(atoms: Int64, evidence: Evidence) -> Int64:
     """Those of some atoms that evidence does not decide."""
     keep = np.ones(len(atoms), bool)
     for predicate in evidence.predicates.values():
@@ -162,7 +140,7 @@ def _unknown(atoms: Int64, evidence: Evidence) -> Int64:
         if predicate.closed:
             keep[mine] = False
         elif mine.any():
-            keep[mine] = ~np.isin(atoms[mine], known_atoms(predicate, evidence))
+            keep[mine] = ~find(known_atoms(predicate, evidence), atoms[mine])[1]
     return atoms[keep]
 
 
@@ -172,7 +150,7 @@ def atom_range(predicate: Predicate, evidence: Evidence) -> tuple[int, int]:
     return low, low + prod(evidence.sizes(predicate.name))
 
 
-def _with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
+def with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
     """The atoms and the other open atoms of their blocks, and for each the number of its block's first atom, or -1."""
     blocks = np.full(len(atoms), -1, np.int64)
     if all(p.value is None for p in evidence.predicates.values()):
@@ -187,7 +165,7 @@ def _with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
         first = np.unique(_first_of_block(atoms[mine], low, stride, size))
         values = np.flatnonzero(evidence.present[predicate.types[predicate.value]][0])
         members = (first[:, None] + values[None, :] * stride).ravel()
-        members = members[~np.isin(members, known_atoms(predicate, evidence))]
+        members = members[~find(known_atoms(predicate, evidence), members)[1]]
         atoms = np.concatenate([atoms[~mine], members])
         blocks = np.concatenate([blocks[~mine], _first_of_block(members, low, stride, size)])
     order = np.argsort(atoms)
@@ -199,7 +177,7 @@ def _first_of_block(atoms: Int64, low: int, stride: int, size: int) -> Int64:
     return np.asarray(atoms - value * stride, np.int64)
 
 
-def _variables(atoms: Int64, block: Int64, evidence: Evidence) -> tuple[Int32, Int32, Int32, NDArray[np.bool_]]:
+def variables_of(atoms: Int64, block: Int64, evidence: Evidence) -> tuple[Int32, Int32, Int32, NDArray[np.bool_]]:
     """Variable and value of each atom; cardinality of each variable and whether it is a block."""
     if (block < 0).all():
         single = np.arange(len(atoms), dtype=np.int32)
@@ -228,62 +206,3 @@ def _may_be_none(first: Int64, is_block: NDArray[np.bool_], evidence: Evidence) 
             low, high = atom_range(predicate, evidence)
             none[is_block & (first >= low) & (first < high)] = 1
     return none
-
-
-# --- factors
-
-Weighted: TypeAlias = list[tuple[Piece, int]]
-"""Pieces, and the index of the weight of each one's row 0."""
-
-
-def _clauses(parts: Sequence[Part], first: Int64, index: Index, n_atoms: int) -> tuple[Clauses, ...]:
-    found = _of_kind(parts, first, ClauseShape, lambda shape: (len(shape.atoms), shape.negated))
-    blocks = []
-    for (k, negated), pieces in sorted(found.items()):
-        codes = ((_codes(p, index), _weights(p, offset), p.count) for p, offset in pieces)
-        blocks.append(Clauses(*merged_codes(codes, _bounds(pieces, k, 2 * n_atoms + 2, first)), negated))
-    return tuple(blocks)
-
-
-def _codes(piece: Piece, index: Index) -> list[Int32]:
-    assert isinstance(piece.shape, ClauseShape)
-    return [code_of(index(a), sign) for a, sign in zip(piece.atoms, piece.shape.signs, strict=True)]
-
-
-def _weights(piece: Piece, offset: int) -> Int32:
-    return (piece.row + offset).astype(np.int32)
-
-
-def _bounds(pieces: Weighted, k: int, number: int, first: Int64) -> Bounds:
-    return Bounds(sum(len(p.row) for p, _ in pieces), k, number, int(first[-1]))
-
-
-def _tables(parts: Sequence[Part], first: Int64, index: Index, n_atoms: int) -> tuple[Tables, ...]:
-    found = _of_kind(parts, first, TableShape, lambda shape: (shape.truth.ndim, shape.truth.tobytes()))
-    blocks = []
-    for (k, truth), pieces in sorted(found.items()):
-        rows, weight, count = _merged(pieces, index, _bounds(pieces, k, n_atoms, first))
-        blocks.append(Tables(rows, np.frombuffer(truth, np.bool_).reshape((2,) * k), weight, count))
-    return tuple(blocks)
-
-
-def _counts(parts: Sequence[Part], first: Int64, index: Index, n_atoms: int) -> tuple[Counts, ...]:
-    found = _of_kind(parts, first, CountShape, lambda shape: shape)
-    return tuple(
-        counts_of(shape, *_merged(pieces, index, _bounds(pieces, len(shape.steps), n_atoms, first)))
-        for shape, pieces in found.items()
-    )
-
-
-def _merged(pieces: Weighted, index: Index, bounds: Bounds) -> Factors:
-    return merged((([index(a) for a in p.atoms], _weights(p, offset), p.count) for p, offset in pieces), bounds)
-
-
-def _of_kind(parts: Sequence[Part], first: Int64, kind: type[S], key: Callable[[S], K]) -> dict[K, Weighted]:
-    """The pieces with a kind of shape, by a key of their shapes."""
-    found: dict[K, Weighted] = {}
-    for part, offset in zip(parts, first.tolist(), strict=False):
-        for piece in part.pieces:
-            if isinstance(piece.shape, kind):
-                found.setdefault(key(piece.shape), []).append((piece, offset))
-    return found

@@ -21,6 +21,9 @@ from mlnlite.model.propositional import Counted, Cube
 WORLDS = "worlds"
 """Table of the numbers of the databases."""
 
+TOUCHED = ".touched"
+"""Ends the names of the tables of atoms about which evidence has changed."""
+
 
 @dataclass(frozen=True, slots=True)
 class Source:
@@ -35,6 +38,8 @@ class Source:
         world: the column of the database, or None where there is one database only.
         counted: the counted propositions of the formula.
         excluded: ends the names of the tables of facts that literals must not contradict; others only generate.
+        touching: indices of atoms, the last of which is to be among those in `P.touched`, and the others not; so plans
+            list the groundings that some atoms touch, each for the first atom of the formula that is one of them.
     """
 
     formula: Formula
@@ -45,6 +50,7 @@ class Source:
     world: str | None = None
     counted: tuple[Counted, ...] = ()
     excluded: str = ""
+    touching: tuple[int, ...] = ()
 
     @property
     def tabled(self) -> bool:
@@ -127,6 +133,13 @@ def _parts(source: Source, cube: Cube) -> tuple[list[tuple[Plan, set[int], int]]
     if source.tabled:
         rows = Scan(source.rows, (*map(column, source.keys), "row"))
         generators.append((rows, set(source.keys), source.n_rows))
+    for index in source.touching:
+        schema = source.formula.atoms[index]
+        scan = Scan(f"{schema.predicate}{TOUCHED}", source.columns(schema))
+        if index == source.touching[-1]:
+            generators.append((scan, variables_of(schema.arguments), 0))
+        else:
+            filters.append(_without(schema, scan))
     for proposition, truth in cube.items():
         if isinstance(proposition, Equal):
             if not truth:
@@ -143,7 +156,11 @@ def _parts(source: Source, cube: Cube) -> tuple[list[tuple[Plan, set[int], int]]
 
 
 def _excluded(source: Source, schema: AtomSchema, truth: bool) -> _Filter:
-    scan = Scan(f"{schema.predicate}.{'true' if truth else 'false'}{source.excluded}", source.columns(schema))
+    table = f"{schema.predicate}.{'true' if truth else 'false'}{source.excluded}"
+    return _without(schema, Scan(table, source.columns(schema)))
+
+
+def _without(schema: AtomSchema, scan: Scan) -> _Filter:
     return _Filter(frozenset(variables_of(schema.arguments)), lambda plan: AntiJoin(plan, scan))
 
 

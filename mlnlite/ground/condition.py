@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import prod
 from typing import TypeAlias
 
 import numpy as np
@@ -15,14 +14,13 @@ from mlnlite.ground.merge import merged_clauses
 from mlnlite.ground.network import Clauses, Counts, Network, Tables
 from mlnlite.ground.residual import ClauseShape, CountShape, Decided, TableShape, table_shape
 from mlnlite.ground.states import NONE, counts_of, reduced
-from mlnlite.model.evidence import Evidence, Facts
+from mlnlite.model.change import UNKNOWN, with_status
+from mlnlite.model.evidence import Evidence
 
 Int8 = NDArray[np.int8]
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
-
-UNKNOWN = -1
 
 
 def condition(network: Network, known: Int8) -> Network:
@@ -125,24 +123,8 @@ def _variables(network: Network, left: Bool, known: Int8) -> tuple[Int32, Int32,
 
 def with_facts(network: Network, known: Int8) -> Evidence:
     """The evidence with the atoms that have become known."""
-    evidence, index = network.evidence, np.flatnonzero(known != UNKNOWN)
-    facts = dict(evidence.facts)
-    for name, low in evidence.first_atom().items():
-        sizes = evidence.sizes(name)
-        high = low + prod(sizes)
-        mine = index[(network.atoms[index] >= low) & (network.atoms[index] < high)]
-        if not len(mine):
-            continue
-        number = network.atoms[mine] - low
-        arguments = np.empty((len(mine), len(sizes)), np.int32)
-        for i in reversed(range(len(sizes))):
-            number, arguments[:, i] = np.divmod(number, sizes[i])
-        old = facts[name]
-        rows = np.concatenate([old.arguments, arguments])
-        truth = np.concatenate([old.truth, known[mine] == 1])
-        order = np.lexsort(tuple(reversed(rows.T))) if rows.shape[1] else np.arange(len(rows))
-        facts[name] = Facts(np.zeros(len(rows), np.int32), rows[order], truth[order])
-    return replace(evidence, facts=facts)
+    index = np.flatnonzero(known != UNKNOWN)
+    return with_status(network.evidence, network.atoms[index], known[index])
 
 
 # --- factors

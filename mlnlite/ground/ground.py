@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from mlnlite.engines.choose import engine_for
 from mlnlite.engines.parts import in_parts, most_rows
-from mlnlite.engines.plan import Column, Engine, Relation, Run, Tables
+from mlnlite.engines.plan import Column, Engine, Plan, Relation, Run, Tables
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
-from mlnlite.ground.assemble import Part, Piece, network_of, sums_by
+from mlnlite.ground.assemble import Part, network_of, sums_by
+from mlnlite.ground.blocks import Piece
 from mlnlite.ground.compile import Compiled, Source, atom_column, bindings, column, compiled, with_atom
 from mlnlite.ground.counting import counting_groups, counting_plan, plain_cubes
 from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, machine_limits, too_large, verify
@@ -63,20 +64,24 @@ def ground(
     """
     model, evidence, tables = prepared(model, evidence)
     run = (engine or engine_for(memory=limits.memory)).load(tables)
-    parts = []
-    for i, template in enumerate(model.templates):
-        with _blamed(template):
-            counting = counting_source(i, template, evidence)
-            source = counting or source_of(i, template, evidence)
-            part = _ground_template(source, template, run, tables, limits)
-            if part is None:
-                part = _ground_template(source_of(i, template, evidence), template, run, tables, limits)
-        assert part is not None
-        parts.append(part)
+    parts = [ground_template(i, t, evidence, run, tables, limits) for i, t in enumerate(model.templates)]
     return network_of(model, evidence, parts, query)
 
 
-def _ground_template(source: Source, template: Template, run: Run, tables: Tables, limits: Limits) -> Part | None:
+def ground_template(
+    index: int, template: Template, evidence: Evidence, run: Run, tables: Tables, limits: Limits = NO_LIMITS
+) -> Part:
+    """What an (expanded) template gives. Raises as `ground`."""
+    with blamed(template):
+        counting = counting_source(index, template, evidence)
+        part = None if counting is None else _ground_source(counting, template, run, tables, limits)
+        if part is None:
+            part = _ground_source(source_of(index, template, evidence), template, run, tables, limits)
+    assert part is not None  # nothing is counted
+    return part
+
+
+def _ground_source(source: Source, template: Template, run: Run, tables: Tables, limits: Limits) -> Part | None:
     """What a template gives; None if what it counts cannot be told from counts."""
     plan = plan_of(source)
     if isinstance(plan, bool):
@@ -88,7 +93,7 @@ def _ground_template(source: Source, template: Template, run: Run, tables: Table
 
 
 @contextmanager
-def _blamed(template: Template) -> Iterator[None]:
+def blamed(template: Template) -> Iterator[None]:
     """Says of limits that are reached within which template that was."""
     try:
         yield
@@ -220,17 +225,25 @@ def plan_of(source: Source) -> TemplatePlan | bool:
 
 def part_of(source: Source, planned: TemplatePlan, run: Run, tables: Tables) -> Part | None:
     """What a template gives; None if what it counts cannot be told from counts. Raises `LimitReached`, unnamed."""
+    tally = tally_of(source, planned, run, in_parts(planned.compiled.plan, tables))
+    if tally is None:
+        return None
+    total = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
+    true = tally.true if planned.lists_true else total - tally.open - tally.false
+    return Part(tuple(tally.pieces), true, total - tally.open - true, tally.open)
+
+
+def tally_of(source: Source, planned: TemplatePlan, run: Run, parts: Sequence[Plan]) -> Tally | None:
+    """What the plan of a template lists, which several plans list together; None and raises as `part_of`."""
     plan = planned.compiled
-    tally = _Tally([], *(np.zeros(source.n_rows, np.int64) for _ in range(3)))
-    for chunk in in_parts(plan.plan, tables):
-        rows = run(chunk)
+    tally = Tally([], *(np.zeros(source.n_rows, np.int64) for _ in range(3)))
+    for part in parts:
+        rows = run(part)
         groups = counting_groups(source, rows) if source.counted else groups_of(source.formula, plan, rows)
         if groups is None:
             return None
         _add(tally, source, plan, rows, groups)
-    total = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
-    true = tally.true if planned.lists_true else total - tally.open - tally.false
-    return Part(tuple(tally.pieces), true, total - tally.open - true, tally.open)
+    return tally
 
 
 def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Run, tables: Tables) -> Part | None:
@@ -243,7 +256,7 @@ def _grounded(source: Source, template: Template, planned: TemplatePlan, run: Ru
         message = f"{template.name} cannot be grounded: {cause.message}"
         raise LimitReached([Diagnostic("E402", message, template.span, cause.hint or advice(source))]) from error
     if part is not None and template.hard and (part.decided_false > 0).any():
-        raise _violated(template, violation(source, planned, run))
+        raise violated(template, violation(source, planned, run))
     return part
 
 
@@ -258,7 +271,8 @@ def _listed(source: Source, planned: TemplatePlan, run: Run) -> str:
     return ""
 
 
-def _violated(template: Template, where: str) -> Contradiction:
+def violated(template: Template, where: str) -> Contradiction:
+    """The error that names a hard template which evidence makes false."""
     hint = "one of the two is wrong: change the facts, or give the formula a weight"
     message = f"the evidence makes {template.name} false, which is hard: {template.text}{where}"
     return Contradiction([Diagnostic("E403", message, template.span, hint)])
@@ -294,13 +308,13 @@ def _constant(source: Source, template: Template, *, truth: bool) -> Part:
     every = np.full(source.n_rows, groundings_of_a_row(source), np.int64)
     none = np.zeros_like(every)
     if template.hard and not truth:
-        raise _violated(template, "")
+        raise violated(template, "")
     return Part((), every, none, none) if truth else Part((), none, every, none)
 
 
 @dataclass(frozen=True, slots=True)
-class _Tally:
-    """What was found so far: pieces, and for each row of the template how many groundings are true, false, open."""
+class Tally:
+    """What was listed so far: pieces, and for each row of the template how many groundings are true, false, open."""
 
     pieces: list[Piece]
     true: Int64
@@ -308,7 +322,7 @@ class _Tally:
     open: Int64
 
 
-def _add(tally: _Tally, source: Source, plan: Compiled, rows: Relation, groups: Sequence[Group]) -> None:
+def _add(tally: Tally, source: Source, plan: Compiled, rows: Relation, groups: Sequence[Group]) -> None:
     """Adds groups of rows to a tally."""
     n_rows = len(next(iter(rows.values()))) if rows else 1
     for group in groups:

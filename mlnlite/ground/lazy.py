@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from mlnlite.engines.choose import engine_for
 from mlnlite.engines.plan import Engine, Relation
-from mlnlite.ground.assemble import Piece
+from mlnlite.ground.blocks import Piece
 from mlnlite.ground.compile import Source, bindings, with_number
-from mlnlite.ground.condition import UNKNOWN, with_facts
+from mlnlite.ground.condition import with_facts
 from mlnlite.ground.ground import row_tables, source_of
 from mlnlite.ground.network import Network
 from mlnlite.ground.residual import ClauseShape
 from mlnlite.ground.tables import tables_of
+from mlnlite.model.change import UNKNOWN
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
 from mlnlite.model.formulas import AtomRef

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.errors import Contradiction, Diagnostic
-from mlnlite.ground.condition import UNKNOWN, condition
+from mlnlite.ground.condition import condition
 from mlnlite.ground.network import Network
+from mlnlite.model.change import UNKNOWN
 
 
 def propagated(network: Network) -> Network:

@@ -66,7 +66,9 @@ def _completed(predicate: Predicate, evidence: Evidence) -> Facts:
     order = np.lexsort(tuple(reversed(every.T)))
     every, truth = every[order], order < len(true)
     new = np.ones(len(every), np.bool_)
-    new[1:] = (every[1:] != every[:-1]).any(axis=1) | truth[1:] | truth[:-1]
+    new[1:] = (every[1:] != every[:-1]).any(axis=1)
+    both = np.flatnonzero(~new[1:] & (truth[1:] != truth[:-1]))
+    _verify_one_value(predicate, every[both], evidence)
     return Facts(every[new, 0], every[new, 1:], truth[new])
 
 
@@ -99,6 +101,14 @@ def _last_values(predicate: Predicate, rows: Int32, truth: NDArray[np.bool_], ev
         left = np.setdiff1d(np.flatnonzero(present[blocks[i, 0]]), rows[block == i, column])
         found.append(np.insert(blocks[i], column, left[0]))
     return np.array(found, np.int32).reshape(-1, rows.shape[1])
+
+
+def _verify_one_value(predicate: Predicate, wrong: Int32, evidence: Evidence) -> None:
+    if len(wrong):
+        names = [evidence.types[t].constants[c] for t, c in zip(predicate.types, wrong[0, 1:], strict=True)]
+        message = f"the evidence makes {predicate.name}({', '.join(names)}) true and false"
+        hint = f"{predicate} has at most one true value"
+        raise Contradiction([Diagnostic("E401", message, predicate.span, hint)])
 
 
 def _verify_some_value(predicate: Predicate, empty: Int32, evidence: Evidence) -> None:

@@ -14,7 +14,7 @@ from mlnlite.engines.choose import engine_for
 from mlnlite.engines.plan import Engine
 from mlnlite.errors import Contradiction, QueryMistake
 from mlnlite.ground.compile import bindings, column
-from mlnlite.ground.condition import UNKNOWN, condition
+from mlnlite.ground.condition import condition
 from mlnlite.ground.ground import row_tables, source_of
 from mlnlite.ground.lazy import world_evidence
 from mlnlite.ground.network import Bool, Int64, Network
@@ -23,6 +23,7 @@ from mlnlite.infer.map.ladder import map_of
 from mlnlite.infer.map.rungs import Method
 from mlnlite.infer.query import question_of
 from mlnlite.infer.score import counts, log_weight, n_paid
+from mlnlite.model.change import UNKNOWN
 from mlnlite.model.propositional import cubes
 from mlnlite.model.unparse import row_text
 from mlnlite.results.why import Alternative, PaidGrounding

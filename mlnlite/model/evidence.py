@@ -137,6 +137,14 @@ class Evidence:
             number = number * size + column
         return number + self.first_atom()[predicate]
 
+    def arguments_of(self, predicate: str, numbers: Int64) -> Int32:
+        """Constant ids of atoms of a predicate, shape (n, arity), from their numbers: the inverse of `atom_number`."""
+        rest, sizes = numbers - self.first_atom()[predicate], self.sizes(predicate)
+        arguments = np.empty((len(numbers), len(sizes)), np.int32)
+        for i in reversed(range(len(sizes))):
+            rest, arguments[:, i] = np.divmod(rest, sizes[i])
+        return arguments
+
     def atom_at(self, number: int) -> tuple[str, tuple[int, ...]]:
         """Predicate and constant ids of atom `number`."""
         first = self.first_atom()
@@ -165,12 +173,12 @@ class Evidence:
         for name, low in self.first_atom().items():
             sizes = self.sizes(name)
             start, stop = np.searchsorted(numbers, [low, low + prod(sizes)])
-            rest = numbers[start:stop] - low
             columns: list[list[str]] = []
-            for type_name, size in zip(reversed(self.predicates[name].types), reversed(sizes), strict=True):
-                rest, ids = np.divmod(rest, size)
+            for type_name, ids in zip(
+                self.predicates[name].types, self.arguments_of(name, numbers[start:stop]).T, strict=True
+            ):
                 constants = self.types[type_name].constants
-                columns.insert(0, [constants[i] for i in ids.tolist()])
+                columns.append([constants[i] for i in ids.tolist()])
             if columns:
                 texts += [f"{name}({', '.join(row)})" for row in zip(*columns, strict=True)]
             else:

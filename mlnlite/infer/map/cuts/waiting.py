@@ -13,7 +13,8 @@ from math import prod
 import numpy as np
 
 from mlnlite.engines.plan import Engine
-from mlnlite.ground.assemble import Piece, atom_range
+from mlnlite.ground.assemble import atom_range
+from mlnlite.ground.blocks import Piece
 from mlnlite.ground.ground import forecasts, ground, prepared
 from mlnlite.ground.lazy import violations, world_evidence
 from mlnlite.ground.merge import merged_clauses

@@ -1,0 +1,101 @@
+"""Ground formulas in pieces to the factors of a network, in blocks of one shape each, equal ones merged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlnlite.ground.merge import Bounds, Factors, code_of, merged, merged_codes
+from mlnlite.ground.network import Clauses, Counts, Tables
+from mlnlite.ground.residual import ClauseShape, CountShape, TableShape
+from mlnlite.ground.states import counts_of
+
+S = TypeVar("S")
+K = TypeVar("K")
+
+Int32 = NDArray[np.int32]
+Int64 = NDArray[np.int64]
+
+Index: TypeAlias = Callable[[Int64], Int32]
+"""Gives the index in the network of atoms by their numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Ground formulas of one template that have one shape.
+
+    Attributes:
+        atoms: for each of `shape.atoms` a column of atom numbers, shape (n,).
+        shape: clause, table, or function of counts.
+        row: shape (n,), row of the template.
+        count: shape (n,), how many groundings.
+    """
+
+    atoms: tuple[Int64, ...]
+    shape: ClauseShape | TableShape | CountShape
+    row: NDArray[Any]
+    count: Int64
+
+
+Weighted: TypeAlias = Sequence[tuple[Piece, int]]
+"""Pieces, and the index of the weight of each one's row 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Blocks:
+    """The factors of a network."""
+
+    clauses: tuple[Clauses, ...]
+    tables: tuple[Tables, ...]
+    counts: tuple[Counts, ...]
+
+
+def blocks_of(pieces: Weighted, index: Index, n_atoms: int, n_weights: int) -> Blocks:
+    """The factors that pieces are.
+
+    Args:
+        pieces: of all templates.
+        index: of atoms in the network.
+        n_atoms: of the network.
+        n_weights: of the network.
+    """
+
+    def bounds(mine: Weighted, k: int, number: int) -> Bounds:
+        return Bounds(sum(len(p.row) for p, _ in mine), k, number, n_weights)
+
+    clauses, tables, counts = [], [], []
+    for (k, negated), mine in sorted(_of_kind(pieces, ClauseShape, lambda s: (len(s.atoms), s.negated)).items()):
+        codes = ((_codes(p, index), _weights(p, first), p.count) for p, first in mine)
+        clauses.append(Clauses(*merged_codes(codes, bounds(mine, k, 2 * n_atoms + 2)), negated))
+    for (k, truth), mine in sorted(_of_kind(pieces, TableShape, lambda s: (s.truth.ndim, s.truth.tobytes())).items()):
+        rows, weight, count = _merged(mine, index, bounds(mine, k, n_atoms))
+        tables.append(Tables(rows, np.frombuffer(truth, np.bool_).reshape((2,) * k), weight, count))
+    for shape, mine in _of_kind(pieces, CountShape, lambda s: s).items():
+        counts.append(counts_of(shape, *_merged(mine, index, bounds(mine, len(shape.steps), n_atoms))))
+    return Blocks(tuple(clauses), tuple(tables), tuple(counts))
+
+
+def _of_kind(pieces: Weighted, kind: type[S], key: Callable[[S], K]) -> dict[K, list[tuple[Piece, int]]]:
+    """The pieces with a kind of shape, by a key of their shapes."""
+    found: dict[K, list[tuple[Piece, int]]] = {}
+    for piece, first in pieces:
+        if isinstance(piece.shape, kind):
+            found.setdefault(key(piece.shape), []).append((piece, first))
+    return found
+
+
+def _codes(piece: Piece, index: Index) -> list[Int32]:
+    assert isinstance(piece.shape, ClauseShape)
+    return [code_of(index(a), sign) for a, sign in zip(piece.atoms, piece.shape.signs, strict=True)]
+
+
+def _weights(piece: Piece, first: int) -> Int32:
+    return (piece.row + first).astype(np.int32)
+
+
+def _merged(pieces: Weighted, index: Index, bounds: Bounds) -> Factors:
+    return merged((([index(a) for a in p.atoms], _weights(p, first), p.count) for p, first in pieces), bounds)
