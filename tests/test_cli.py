@@ -435,12 +435,15 @@ def test_a_failed_write_leaves_the_old_file(folder, monkeypatch):
     assert sorted(p.name for p in folder.iterdir()) == ["e.db", "m.mln", "out.mln"]
 
 
-def test_interruption_is_one_line(folder):
-    slow = "import time, mlnlite.cli.check as c; c._summary = lambda *a: time.sleep(60)"
+def test_interruption_is_one_line(folder, tmp_path):
+    begun = tmp_path / "begun"
+    wait = f"(open({str(begun)!r}, 'w').close(), time.sleep(60))"
+    slow = f"import time, mlnlite.cli.check as c; c._summary = lambda *a: {wait}"
     run_it = "import mlnlite.cli; mlnlite.cli.main()"
     command = [sys.executable, "-c", f"{slow}\n{run_it}", "check", str(folder / "m.mln")]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(2)
+    while not begun.exists() and process.poll() is None:
+        time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     stdout, stderr = process.communicate(timeout=30)
     assert (process.returncode, stdout, stderr) == (130, "", "interrupted\n")
