@@ -46,7 +46,7 @@ def friends(n):
     pairs.sort()  # np.unique, which hashes, takes a minute here
     pairs = pairs[np.append(True, pairs[1:] != pairs[:-1])]
     pairs = np.stack(np.divmod(pairs, n), 1).astype(np.int32)
-    pairs = np.asfortranarray(pairs[pairs[:, 0] != pairs[:, 1]])  # as facts that are read
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     known = np.sort(rng.choice(n, n // 10, replace=False)).astype(np.int32)[:, None]
     zeros = lambda k: np.zeros(k, np.int32)  # noqa: E731
     facts = {
