@@ -41,6 +41,7 @@ class _Options(TypedDict):
     held_out: Path | None
     laplace_path: Path | None
     structure: bool
+    given: tuple[str, ...]
     report: Literal["sandwich", "information", "bootstrap"] | None
     seed: int
     time_limit: float | None
@@ -79,7 +80,15 @@ class _Inputs:
 @click.option(
     "--structure",
     is_flag=True,
-    help="First add rules that the data show; needs `--predict`. All other predicates are conditions.",
+    help="First add rules that the data show about what `--predict` names; there, `way(+, #)` is one rule for each "
+    "constant.",
+)
+@click.option(
+    "--given",
+    multiple=True,
+    metavar="MODES",
+    help="What these rules may ask about: predicates, or modes: `Smokes, Friends(+, -), level(+, #)`, with `+` known "
+    "before, `-` known or new, `#` a constant. By default all others.",
 )
 @click.option(
     "--report",
@@ -127,14 +136,17 @@ def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report |
     model, databases = read(inputs.models, inputs.databases, options["dialect"])
     if options["shared_constants"]:
         databases = ml.with_shared_constants(databases)
+    predict = names(options["predict"])
     if options["structure"]:
-        model = _with_rules(model, databases, names(options["predict"]), options["seed"])
+        model, predict = _with_rules(model, databases, options), _predicates(predict)
+    elif options["given"]:
+        raise click.UsageError("--given says what rules may ask about; add --structure to look for some")
     with working("learning"):
         learned = ml.learn(
             model,
             databases,
             objective=options["objective"],
-            predict=names(options["predict"]) or None,
+            predict=predict or None,
             open_predicates=names(options["open_predicates"]),
             prior=prior_of(options["prior"], options["prior_sd"], options["prior_of"]),
             tied=[[name.strip() for name in group.split(";")] for group in options["tie"]],
@@ -181,17 +193,24 @@ def _write_path(learned: LearnedModel, file: Path) -> None:
     write_whole(file, "\n".join(["scale,weight,formula", *rows]) + "\n")
 
 
-def _with_rules(model: Model, databases: Evidence, predict: list[str], seed: int) -> Model:
+def _with_rules(model: Model, databases: Evidence, options: _Options) -> Model:
     """The model with the rules that were found, which are shown."""
     import mlnlite as ml
 
+    predict = names(options["predict"])
     if not predict:
         raise click.UsageError("--structure needs --predict: what the rules are to conclude")
-    given = [name for name in model.predicates if name not in predict]
+    others = [name for name in model.predicates if name not in _predicates(predict)]
+    given = names(options["given"]) or others
     with working("looking for rules"):
-        found = ml.find_rules(model, databases, predict=predict, given=given, seed=seed)
+        found = ml.find_rules(model, databases, predict=predict, given=given, seed=options["seed"])
     click.echo(f"{found}\n", err=True)
     return found.model
+
+
+def _predicates(modes: list[str]) -> list[str]:
+    """The predicates of modes, each once."""
+    return list(dict.fromkeys(mode.partition("(")[0].strip() for mode in modes))
 
 
 def learned_text(learned: LearnedModel) -> str:

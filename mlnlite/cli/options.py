@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -94,9 +95,10 @@ open_world_option = click.option(
 
 
 def names(values: Sequence[str]) -> list[str]:
-    """The names of a repeated, comma-separated option.
+    """The names of a repeated, comma-separated option; commas in brackets separate nothing.
 
-    >>> names(["isA,hasShape", "handover"])
-    ['isA', 'hasShape', 'handover']
+    >>> names(["isA,hasShape", "Friends(+, -)"])
+    ['isA', 'hasShape', 'Friends(+, -)']
     """
-    return [name.strip() for value in values for name in value.split(",") if name.strip()]
+    found = [name.strip() for value in values for name in re.split(r",(?![^()]*\))", value)]
+    return [name for name in found if name]

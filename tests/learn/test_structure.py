@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import mlnlite as ml
-from mlnlite.learn.structure.candidates import candidates, rule_text
+from mlnlite.learn.structure.candidates import Language, candidates, rule_text
 from mlnlite.learn.structure.find import find_rules
+from mlnlite.learn.structure.modes import modes_of
 
 VOCABULARY = "Ill(p)\nSmokes(p)\nSporty(p)\nCoffee(p)\nRich(p)\nFriends(p, p)\n"
 PLANTED = {"Smokes(x) => Ill(x)", "Sporty(x) => Ill(x)", "Friends(x, y) ^ Rich(y) => Ill(x)"}
@@ -49,12 +50,72 @@ def test_nothing_is_found_in_noise():
     assert found.rules == ()
 
 
+def texts_of(text, heads, bodies, most_literals=2, constants=""):
+    """The candidates that modes allow, as texts."""
+    model = ml.model_from_text(text)
+    types = ml.evidence_from_text(constants or "\n", model=model).types
+    language = Language(model.predicates, types, *(modes_of(m, model.predicates) for m in (heads, bodies)))
+    return [rule_text(rule, model.dialect) for rule in candidates(language, most_literals)]
+
+
 def test_candidates_are_connected_and_each_once():
-    model = ml.model_from_text("S(p)\nF(p, p)\nH(q)\n")
-    texts = [rule_text(r) for r in candidates(model.predicates, ["S"], ["S", "F", "H"], 2)]
+    texts = texts_of("S(p)\nF(p, p)\nH(q)\n", ["S"], ["S", "F", "H"])
     assert len(texts) == len(set(texts))
     assert "F(x, y) ^ S(y) => S(x)" in texts or "S(y) ^ F(x, y) => S(x)" in texts
     assert not any("H" in t for t in texts)
+
+
+def test_modes_say_where_arguments_come_from():
+    assert texts_of("S(p)\nF(p, p)\n", ["S"], ["F(+, -)", "S(+)"]) == [
+        "F(x, x) => S(x)",
+        "F(x, y) => S(x)",
+        "F(x, x) ^ F(x, y) => S(x)",
+        "F(x, y) ^ F(x, z) => S(x)",
+        "F(x, y) ^ F(y, x) => S(x)",
+        "F(x, y) ^ F(y, y) => S(x)",
+        "F(x, y) ^ F(y, z) => S(x)",
+        "F(x, y) ^ S(y) => S(x)",
+    ]
+    assert texts_of("S(p)\nF(p, p)\n", ["S"], ["F(+, +)", "S(+)"]) == ["F(x, x) => S(x)"]
+
+
+def test_modes_bring_in_several_variables_and_constants():
+    assert texts_of("S(p)\nR(p, q, r)\n", ["S(+)"], ["R(+, -, -)"], 1) == ["R(x, y, z) => S(x)"]
+    assert texts_of("S(p)\nR(p, q, r)\n", ["S(+)"], ["R"], 1) == []
+    constants = 'l = {Low, High}\nm = {near, "far off"}'
+    found = texts_of("level(p, l!)\nway(p, m!)", ["way(+, #)"], ["level(+, #)"], 1, constants)
+    assert found == [f'level(x, {a}) => way(x, "{b}")' for b in ("near", "far off") for a in ("Low", "High")]
+
+
+@pytest.mark.parametrize(
+    ("mode", "message"),
+    [
+        ("F(+)", "has 1 arguments"),
+        ("F(+, x)", "the argument `x`"),
+        ("G(+, -)", "there is no predicate G"),
+        ("F(+, -", "is no mode"),
+        ("F()", "the argument ``"),
+    ],
+)
+def test_wrong_modes_are_refused(mode, message):
+    model = ml.model_from_text("S(p)\nF(p, p)\n")
+    with pytest.raises(ml.QueryMistake, match=message):
+        modes_of([mode], model.predicates)
+
+
+@pytest.mark.parametrize("dialect", ["standard", "prac"])
+def test_rules_about_constants_are_found(dialect):
+    """Of three levels, one goes with a way, in models of either dialect."""
+    random = np.random.default_rng(0)
+    levels = random.choice(["Low", "Middle", "High"], 300)
+    ways = np.where(random.random(300) < np.where(levels == "Low", 0.9, 0.3), "Near", "Far")
+    model = ml.model_from_text("level(person, l!)\nway(person, w!)", dialect=dialect)
+    text = "\n".join(f"level(P{i}, {a})\nway(P{i}, {b})" for i, (a, b) in enumerate(zip(levels, ways, strict=True)))
+    data = ml.evidence_from_text(text, model=model)
+    found = find_rules(model, data, predict=["way(+, #)"], given=["level(+, #)"], most_literals=1, resamples=2)
+    x = "?x" if dialect == "prac" else "x"
+    assert found.n_candidates == 6
+    assert found.rules[0].text in {f"level({x}, Low) => way({x}, {way})" for way in ("Near", "Far")}
 
 
 def test_no_candidate_is_refused():

@@ -3,41 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import permutations, product
 from typing import TypeAlias
 
-from mlnlite.model.symbols import Predicate
+from mlnlite.learn.structure.modes import Mode
+from mlnlite.model.symbols import Predicate, Type
+from mlnlite.syntax import tree
+from mlnlite.syntax.write import write_formula
 
-Atom: TypeAlias = tuple[str, tuple[int, ...]]
-"""A predicate and the numbers of its variables."""
+Atom: TypeAlias = tuple[str, tuple[int | str, ...]]
+"""A predicate, and the numbers of its variables, or constants."""
 
 Rule: TypeAlias = tuple[tuple[Atom, ...], Atom]
 """Body and head."""
 
+NEW = -1
+"""A variable before it has a number."""
 
-def candidates(
-    predicates: Mapping[str, Predicate], heads: Sequence[str], bodies: Sequence[str], most_literals: int = 2
-) -> list[Rule]:
-    """Rules whose body literals hang together with the head, each bringing in at most one new variable.
 
-    Args:
+@dataclass(frozen=True, slots=True)
+class Language:
+    """What rules may say.
+
+    Attributes:
         predicates: the vocabulary.
-        heads: predicates that rules conclude.
-        bodies: predicates that rules may ask about.
-        most_literals: of a body.
+        types: with the constants that rules may name.
+        heads: what atoms may look like that rules conclude.
+        bodies: what atoms may look like that rules ask about.
     """
+
+    predicates: Mapping[str, Predicate]
+    types: Mapping[str, Type]
+    heads: Sequence[Mode]
+    bodies: Sequence[Mode]
+
+
+def candidates(language: Language, most_literals: int = 2) -> list[Rule]:
+    """Rules whose body literals hang together with the head, `most_literals` of them at most."""
     found: dict[Rule, Rule] = {}
-    for name in heads:
-        types = list(predicates[name].types)
-        head = (name, tuple(range(len(types))))
-        for body, all_types in _bodies(predicates, bodies, (head, types), most_literals):
-            rule = (body, head)
-            found.setdefault(_canonical(rule, len(all_types)), rule)
+    for mode in language.heads:
+        for head, types in _heads(language, mode):
+            for body, all_types in _bodies(language, (head, types), most_literals):
+                rule = (body, head)
+                found.setdefault(_canonical(rule, len(types), len(all_types)), rule)
     return list(found.values())
 
 
+def _heads(language: Language, mode: Mode) -> Iterator[tuple[Atom, list[str]]]:
+    """Heads, with the types of their variables."""
+    of = language.predicates[mode.predicate].types
+    options = [language.types[t].constants if s == "#" else (NEW,) for s, t in zip(mode.signs, of, strict=True)]
+    for arguments in product(*options):
+        yield _numbered(mode.predicate, arguments, of, [])
+
+
 def _bodies(
-    predicates: Mapping[str, Predicate], names: Sequence[str], start: tuple[Atom, list[str]], depth: int
+    language: Language, start: tuple[Atom, list[str]], depth: int
 ) -> Iterator[tuple[tuple[Atom, ...], list[str]]]:
     """Bodies of up to `depth` literals, with the types of all variables."""
     head, types = start
@@ -45,37 +67,57 @@ def _bodies(
     for _ in range(depth):
         longer = []
         for body, known in level:
-            for name in names:
-                for atom, grown in _atoms(predicates[name], known):
+            for mode in language.bodies:
+                for atom, grown in _atoms(language, mode, known):
                     if atom != head and atom not in body:
                         longer.append(((*body, atom), grown))
         yield from longer
         level = longer
 
 
-def _atoms(predicate: Predicate, types: list[str]) -> Iterator[tuple[Atom, list[str]]]:
-    """Atoms over known variables and at most one new one, sharing at least one (unless there is none to share)."""
-    new = len(types)
-    options = [[v for v, t in enumerate(types) if t == of] + [new] for of in predicate.types]
+def _atoms(language: Language, mode: Mode, known: list[str]) -> Iterator[tuple[Atom, list[str]]]:
+    """Atoms over known and new variables that share one (unless there is none to share)."""
+    of = language.predicates[mode.predicate].types
+    options: list[list[int | str]] = []
+    for sign, t in zip(mode.signs, of, strict=True):
+        bound: list[int | str] = [v for v, found in enumerate(known) if found == t]
+        options.append(list(language.types[t].constants) if sign == "#" else bound + [NEW] * (sign == "-"))
     for arguments in product(*options):
-        fresh = {predicate.types[i] for i, v in enumerate(arguments) if v == new}
-        shares = any(v < new for v in arguments) or not predicate.types
-        if len(fresh) <= 1 and arguments.count(new) <= 1 and shares:
-            yield (predicate.name, arguments), [*types, *fresh]
+        variables = [v for v in arguments if not isinstance(v, str)]
+        if variables.count(NEW) <= mode.most_new and (set(variables) - {NEW} or not variables):
+            yield _numbered(mode.predicate, arguments, of, known)
 
 
-def _canonical(rule: Rule, n_variables: int) -> Rule:
-    """The least of all ways to number the variables that the head does not have, the body sorted."""
+def _numbered(
+    name: str, arguments: Sequence[int | str], types: Sequence[str], known: list[str]
+) -> tuple[Atom, list[str]]:
+    """An atom whose new variables have numbers, and the types of all variables."""
+    found: list[int | str] = []
+    grown = list(known)
+    for argument, t in zip(arguments, types, strict=True):
+        if argument == NEW:
+            argument = len(grown)
+            grown.append(t)
+        found.append(argument)
+    return (name, tuple(found)), grown
+
+
+def _canonical(rule: Rule, first: int, n_variables: int) -> tuple[object, Atom]:
+    """The least of all ways to number the variables from `first` on, which the head does not have, the body sorted."""
     body, head = rule
-    first = len(head[1])
     ways = []
     for order in permutations(range(first, n_variables)):
         number = [*range(first), *order]
-        ways.append(tuple(sorted((name, tuple(number[v] for v in arguments)) for name, arguments in body)))
-    return min(ways), head
+        ways.append(
+            sorted(
+                (name, tuple((True, v) if isinstance(v, str) else (False, number[v]) for v in arguments))
+                for name, arguments in body
+            )
+        )
+    return tuple(min(ways)), head
 
 
-def rule_text(rule: Rule) -> str:
+def rule_text(rule: Rule, dialect: tree.Dialect = "standard") -> str:
     """A rule as a model writes it.
 
     >>> rule_text(((("Friends", (0, 1)), ("Smokes", (1,))), ("Smokes", (0,))))
@@ -84,8 +126,12 @@ def rule_text(rule: Rule) -> str:
     body, head = rule
     names = ("x", "y", "z", "u", "v", "w")
 
-    def text(atom: Atom) -> str:
-        inside = ", ".join(names[v] if v < len(names) else f"x{v}" for v in atom[1])
-        return f"{atom[0]}({inside})" if inside else atom[0]
+    def atom(found: Atom) -> tree.Atom:
+        terms = [tree.Constant(v) if isinstance(v, str) else tree.Variable(variable(v)) for v in found[1]]
+        return tree.Atom(found[0], tuple(terms))
 
-    return f"{' ^ '.join(map(text, body))} => {text(head)}"
+    def variable(number: int) -> str:
+        return names[number] if number < len(names) else f"x{number}"
+
+    atoms = tuple(map(atom, body))
+    return write_formula(tree.Implies(atoms[0] if len(atoms) == 1 else tree.And(atoms), atom(head)), dialect)

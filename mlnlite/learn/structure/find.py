@@ -24,12 +24,15 @@ from mlnlite.learn.optimise import information
 from mlnlite.learn.optimise.problem import Problem
 from mlnlite.learn.optimise.solve import best
 from mlnlite.learn.prior import Penalty
-from mlnlite.learn.structure.candidates import candidates, rule_text
+from mlnlite.learn.structure.candidates import Language, candidates, rule_text
+from mlnlite.learn.structure.modes import modes_of
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import AtomRef
 from mlnlite.model.model import Model
 from mlnlite.model.read import model_from_text
 from mlnlite.model.unparse import model_text
+from mlnlite.syntax import tree
+from mlnlite.syntax.write import write_formula
 
 Float = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -96,19 +99,23 @@ def find_rules(
     Args:
         model: the vocabulary, and formulas that are kept.
         databases: complete.
-        predict: predicates that rules conclude.
-        given: predicates that rules may ask about; by default all.
+        predict: predicates that rules conclude, by name or as modes such as `method(+, #)`.
+        given: predicates that rules may ask about, by name or as modes such as `Friends(+, -)`; by default all. A sign
+            says what an argument is: `+` a variable that stands in the head or further left, `-` such a variable or a
+            new one, `#` a constant (a rule for each). By name, variables stand everywhere, one new one at most.
         most_literals: of a rule's body.
         most_rules: how many to add.
         resamples: bootstrap samples for the stability of the rules; atoms are drawn, as if independent.
         seed: of the bootstrap.
 
     Raises:
-        QueryMistake: if there is no candidate.
+        QueryMistake: if there is no candidate, or a mode does not fit.
     """
-    targets = target_names(databases, predict)
-    names = list(model.predicates if given is None else given)
-    rules = [rule_text(r) for r in candidates(model.predicates, targets, names, most_literals)]
+    heads = modes_of(predict, model.predicates)
+    bodies = modes_of(model.predicates if given is None else given, model.predicates)
+    targets = target_names(databases, {mode.predicate: None for mode in heads})
+    found_rules = candidates(Language(model.predicates, databases.types, heads, bodies), most_literals)
+    rules = [rule_text(rule, model.dialect) for rule in found_rules]
     units = [_unit(model, name) for name in targets if not _has_unit(model, name)]
     if not rules:
         raise QueryMistake("there is no rule to try", "name more predicates, or allow longer bodies")
@@ -132,8 +139,8 @@ def find_rules(
 def _unit(model: Model, name: str) -> str:
     """The formula that says how frequent a predicate is."""
     predicate = model.predicates[name]
-    inside = ", ".join(("+" if i == predicate.value else "") + f"x{i}" for i in range(predicate.arity))
-    return f"{name}({inside})" if inside else name
+    terms = tuple(tree.Variable(f"x{i}", plus=i == predicate.value) for i in range(predicate.arity))
+    return write_formula(tree.Atom(name, terms), model.dialect)
 
 
 def _has_unit(model: Model, name: str) -> bool:
