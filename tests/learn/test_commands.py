@@ -75,7 +75,7 @@ def test_structure(files):
     assert "candidates" in run(*words).stderr
     refused = run("learn", files / "m.mln", files / "d.db", "--structure", code=2)
     assert "--predict" in refused.output
-    assert "1 of 1 candidates" in run(*words, "--given", "S(+)").stderr
+    assert "of 1 candidates" in run(*words, "--given", "S(+)").stderr
     assert "argument `x`" in run(*words, "--given", "S(x)", code=2).output
     assert "--structure" in run("learn", files / "m.mln", files / "d.db", "--given", "S", code=2).output
 

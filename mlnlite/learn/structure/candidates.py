@@ -41,7 +41,7 @@ class Language:
 
 def candidates(language: Language, most_literals: int = 2) -> list[Rule]:
     """Rules whose body literals hang together with the head, `most_literals` of them at most."""
-    found: dict[Rule, Rule] = {}
+    found: dict[object, Rule] = {}
     for mode in language.heads:
         for head, types in _heads(language, mode):
             for body, all_types in _bodies(language, (head, types), most_literals):
@@ -53,7 +53,9 @@ def candidates(language: Language, most_literals: int = 2) -> list[Rule]:
 def _heads(language: Language, mode: Mode) -> Iterator[tuple[Atom, list[str]]]:
     """Heads, with the types of their variables."""
     of = language.predicates[mode.predicate].types
-    options = [language.types[t].constants if s == "#" else (NEW,) for s, t in zip(mode.signs, of, strict=True)]
+    options: list[Sequence[int | str]] = [
+        language.types[t].constants if sign == "#" else (NEW,) for sign, t in zip(mode.signs, of, strict=True)
+    ]
     for arguments in product(*options):
         yield _numbered(mode.predicate, arguments, of, [])
 
@@ -78,10 +80,10 @@ def _bodies(
 def _atoms(language: Language, mode: Mode, known: list[str]) -> Iterator[tuple[Atom, list[str]]]:
     """Atoms over known and new variables that share one (unless there is none to share)."""
     of = language.predicates[mode.predicate].types
-    options: list[list[int | str]] = []
+    options: list[Sequence[int | str]] = []
     for sign, t in zip(mode.signs, of, strict=True):
         bound: list[int | str] = [v for v, found in enumerate(known) if found == t]
-        options.append(list(language.types[t].constants) if sign == "#" else bound + [NEW] * (sign == "-"))
+        options.append(language.types[t].constants if sign == "#" else bound + [NEW] * (sign == "-"))
     for arguments in product(*options):
         variables = [v for v in arguments if not isinstance(v, str)]
         if variables.count(NEW) <= mode.most_new and (set(variables) - {NEW} or not variables):
@@ -102,7 +104,7 @@ def _numbered(
     return (name, tuple(found)), grown
 
 
-def _canonical(rule: Rule, first: int, n_variables: int) -> tuple[object, Atom]:
+def _canonical(rule: Rule, first: int, n_variables: int) -> object:
     """The least of all ways to number the variables from `first` on, which the head does not have, the body sorted."""
     body, head = rule
     ways = []
