@@ -128,7 +128,7 @@ def prepared(model: Model, evidence: Evidence) -> tuple[Model, Evidence, Tables]
     _verify_weights(model)
     evidence = completed(evidence)
     templates = (*model.templates, *soft_templates(evidence))
-    model = replace(model, templates=tuple(t.expanded(evidence.types) for t in templates))
+    model = replace(model, types=evidence.types, templates=tuple(t.expanded(evidence.types) for t in templates))
     return model, evidence, {**tables_of(evidence), **row_tables(model)}
 
 

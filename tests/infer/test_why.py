@@ -116,3 +116,11 @@ def test_commands(tmp_path):
         assert CliRunner().invoke(command, [*base, *options]).exit_code == 2
     marginal = [*base[:4], "-q", "Smokes", "--why"]
     assert CliRunner().invoke(command, marginal).exit_code == 2
+
+
+def test_rows_of_constants_that_only_the_evidence_has_are_named():
+    """The weight of `+c` is that of a constant which the model never heard of."""
+    model = ml.model_from_text("Likes(person, colour)\n0.8 Likes(x, +c)\n1.5 !Likes(x, c)")
+    evidence = ml.evidence_from_text("Likes(Ann, Red)\n!Likes(Bob, Blue)\n", model=model)
+    state = ml.map_state(model, evidence)
+    assert [(v.formula, v.n_groundings) for v in state.violated] == [("Likes(x, Red)", 1), ("Likes(x, Blue)", 1)]
