@@ -156,7 +156,7 @@ def _sizes(network: Network) -> dict[str, int]:
         "n_atoms": network.n_atoms,
         "n_variables": network.n_variables,
         "n_factors": network.n_factors,
-        "n_components": len(components_of(network)),
+        "n_components": int(components_of(network).max(initial=-1)) + 1,
     }
 
 

@@ -18,6 +18,7 @@ from mlnlite.infer.exact.formula import formula_probabilities
 from mlnlite.infer.exact.marginal import ELIMINATION, AtomProbabilities, Rung, marginals_of
 from mlnlite.infer.exact.wmc import MODEL_COUNTING, count_models, is_available, is_mostly_hard, verify_available
 from mlnlite.infer.query import atom_numbers
+from mlnlite.infer.reduce.components import components_of
 from mlnlite.infer.reduce.parts import Part, Summed
 from mlnlite.model.formulas import Expression
 
@@ -86,6 +87,7 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
         raise QueryMistake("belief propagation answers atoms only", hint="ask for `auto`, or for the atoms")
     if approach.method in SAMPLERS:
         everything = np.ones(network.n_variables, np.bool_)
+        solution.n_components = int(components_of(network).max(initial=-1)) + 1
         _enter_sample(network, solution, everything, (atoms, formulas, np.arange(len(solution.methods))), approach)
         return solution
     network, small, found = _exactly(network, None if len(asked) == network.n_atoms else asked, approach)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,23 +11,6 @@ from mlnlite.ground.network import Int32, Int64, Network
 _FEW = 2000
 _ROW_BITS = 32
 _ROWS = (1 << _ROW_BITS) - 1
-
-
-@dataclass(frozen=True, slots=True)
-class Component:
-    """A part of a network that shares no factor with the rest of it.
-
-    Attributes:
-        variables: its variables, rising.
-        clauses: for each block of `Network.clauses`, the rows that belong to it, rising.
-        tables: for each block of `Network.tables`, the rows that belong to it, rising.
-        counts: for each block of `Network.counts`, the rows that belong to it, rising.
-    """
-
-    variables: Int64
-    clauses: tuple[Int64, ...]
-    tables: tuple[Int64, ...]
-    counts: tuple[Int64, ...]
 
 
 def labels_of(n_variables: int, scopes: Iterable[Int32]) -> Int32:
@@ -92,22 +74,7 @@ def rows_by_label(labels: Int32, n_labels: int) -> tuple[Int64, Int64]:
     return packed & _ROWS, np.searchsorted(packed >> _ROW_BITS, np.arange(n_labels + 1))
 
 
-def components_of(network: Network) -> tuple[Component, ...]:
-    """The components of a network, in order of their smallest variable.
-
-    Factors without an open atom belong to none.
-    """
-    scopes = [network.variable[np.abs(c.literals) - 1] for c in network.clauses]
-    scopes += [network.variable[t.atoms] for t in network.tables]
-    scopes += [network.variable[np.abs(c.literals) - 1] for c in network.counts]
-    labels = labels_of(network.n_variables, scopes)
-    n = int(labels.max(initial=-1)) + 1
-    variables, starts = rows_by_label(labels, n)
-    blocks = [rows_by_label(labels[s[:, 0]] if s.shape[1] else np.full(len(s), n, np.int32), n) for s in scopes]
-    parts = []
-    for i in range(n):
-        rows = [order[begin[i] : begin[i + 1]] for order, begin in blocks]
-        first, last = len(network.clauses), len(network.clauses) + len(network.tables)
-        split = tuple(rows[:first]), tuple(rows[first:last]), tuple(rows[last:])
-        parts.append(Component(variables[starts[i] : starts[i + 1]], *split))
-    return tuple(parts)
+def components_of(network: Network) -> Int32:
+    """Component number of each variable of a network, by links between the open atoms of factors; see `labels_of`."""
+    scopes = [network.variable[np.abs(c.literals) - 1] for c in (*network.clauses, *network.counts)]
+    return labels_of(network.n_variables, [*scopes, *(network.variable[t.atoms] for t in network.tables)])

@@ -118,8 +118,9 @@ class CrossValidation:
         split = self.split
         way = {"database": "databases", "cluster": "distinct databases", "key": f"keys ({', '.join(split.key)})"}
         way["constant"] = f"groups that share no {' or '.join(split.key)}"
+        n_folds = min(split.n_folds, self.n_groups)
         lines.append(
-            f"{self.n_databases:,} databases, {self.n_groups:,} {way[split.by]} in {split.n_folds} folds, "
+            f"{self.n_databases:,} databases, {self.n_groups:,} {way[split.by]} in {n_folds} folds, "
             f"{split.repeats} time{'s' * (split.repeats != 1)}"
         )
         return "\n".join([*(line.rstrip() for line in lines), *(f"warning: {w}" for w in self.warnings)])
