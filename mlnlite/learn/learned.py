@@ -143,7 +143,7 @@ class LearnedModel:
     def _clipped(self, n_unbounded: int) -> str:
         if not n_unbounded or self.prior is not None:
             return ""
-        return f"  (clipped at +-{self.bound:g}: the data never contradict these formulas, or never support them)"
+        return f"  (kept within +-{self.bound:g}: without end these would only explain the data better)"
 
     def _repr_html_(self) -> str:
         """The same for a notebook, with the weights of small templates."""

@@ -10,13 +10,14 @@ from pathlib import Path as FilePath
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, EvidenceMistake, ModelMistake, SyntaxMistake, did_you_mean, in_order
 from mlnlite.model.check import check
 from mlnlite.model.evidence import Evidence, Facts
 from mlnlite.model.facts import TableFacts, check_evidence
 from mlnlite.model.model import Model
-from mlnlite.model.soft import of_database
+from mlnlite.model.soft import of_databases
 from mlnlite.model.table import Table, read_mapping
 from mlnlite.source import Source
 from mlnlite.syntax.evidence import parse_evidence
@@ -132,10 +133,22 @@ def one_database(evidence: Evidence, index: int) -> Evidence:
     """
     if not 0 <= index < evidence.n_databases:
         raise EvidenceMistake(f"there is no database {index}; there are 0 to {evidence.n_databases - 1}")
+    return some_databases(evidence, np.array([index]))
+
+
+def some_databases(evidence: Evidence, chosen: NDArray[np.int64]) -> Evidence:
+    """Some of the databases, in rising order of their numbers `chosen`."""
+    number = np.full(evidence.n_databases, -1, np.int32)
+    number[chosen] = np.arange(len(chosen), dtype=np.int32)
     facts = {}
     for name, table in evidence.facts.items():
-        mine = table.database == index
-        facts[name] = Facts(np.zeros(int(mine.sum()), np.int32), table.arguments[mine], table.truth[mine])
-    present = {name: p[index : index + 1] for name, p in evidence.present.items()}
-    names, soft = (evidence.names[index],), of_database(evidence.soft, index)
-    return replace(evidence, facts=facts, present=present, n_databases=1, names=names, soft=soft)
+        keep = number[table.database] >= 0
+        facts[name] = Facts(number[table.database[keep]], table.arguments[keep], table.truth[keep])
+    return replace(
+        evidence,
+        facts=facts,
+        soft=of_databases(evidence.soft, number),
+        present={name: p[chosen] for name, p in evidence.present.items()},
+        n_databases=len(chosen),
+        names=tuple(evidence.names[i] for i in chosen.tolist()),
+    )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite.model.evidence import Evidence, Facts, SoftFacts
+from mlnlite.model.evidence import Evidence, Facts, Int32, SoftFacts
 from mlnlite.model.formulas import AtomRef, AtomSchema, Formula, TypedVariable, Var
 from mlnlite.model.symbols import Predicate
 from mlnlite.model.templates import Template
@@ -89,12 +89,16 @@ def _template(predicate: Predicate, soft: SoftFacts) -> Template:
     return Template("soft evidence", formula, keys, rows.astype(np.int32), weights, fixed=True, text=text)
 
 
-def of_database(soft: Mapping[str, SoftFacts], index: int) -> dict[str, SoftFacts]:
-    """The soft facts of one database, as evidence of its own."""
+def of_databases(soft: Mapping[str, SoftFacts], number: Int32) -> dict[str, SoftFacts]:
+    """The soft facts of some databases.
+
+    Args:
+        soft: of all databases.
+        number: shape (n_databases,), the new number of each database, -1 for those that are left out.
+    """
     found = {}
     for name, facts in soft.items():
-        mine = facts.database == index
+        mine = number[facts.database] >= 0
         if mine.any():
-            n = int(mine.sum())
-            found[name] = SoftFacts(np.zeros(n, np.int32), facts.arguments[mine], facts.weight[mine])
+            found[name] = SoftFacts(number[facts.database[mine]], facts.arguments[mine], facts.weight[mine])
     return found

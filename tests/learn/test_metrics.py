@@ -15,7 +15,8 @@ import mlnlite as ml
 from mlnlite.learn.evaluation import metrics
 from mlnlite.learn.evaluation.baselines import SPREAD, look_up, majority, naive_bayes, pairwise_logistic
 from mlnlite.learn.evaluation.crossvalidate import MODEL, Split, Training, crossvalidate
-from mlnlite.learn.evaluation.folds import folds, groups, select
+from mlnlite.learn.evaluation.folds import folds, groups
+from mlnlite.model.read import some_databases
 from tests.learn.data import folder
 
 
@@ -102,7 +103,7 @@ def test_groups_and_selection():
     data = ml.evidence_from_text("S(A)\nC(A)\n---\nS(B)\n---\nS(A)\nC(A)\n---\nS(A)", model=model)
     assert groups(data, "cluster").tolist() == [0, 1, 0, 2]
     assert groups(data, "key", ["S"]).tolist() == [0, 1, 0, 0]
-    part = select(data, np.array([1, 3]))
+    part = some_databases(data, np.array([1, 3]))
     assert part.n_databases == 2
     assert part.facts["S"].database.tolist() == [0, 1]
     assert len(part.facts["C"].truth) == 0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import mlnlite as ml
 from mlnlite.engines.duckdb import DuckDBEngine
@@ -18,6 +20,10 @@ from mlnlite.learn.optimise import likelihood
 from tests import brute
 from tests.models import evidence_texts, model_texts
 
+QUANTIFIED = [
+    "EXIST y A(x, y)", "FORALL y A(x, y)", "S(x) => EXIST y A(x, y)", "EXIST y (A(x, y) ^ S(y))", "A(x, +y) v S(x)",
+    "EXIST x, y A(x, y)", "FORALL y (A(x, y) => S(y))", "count(A(x, y) | y) >= 2",
+]  # fmt: skip
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
@@ -52,6 +58,33 @@ def test_value_and_gradient(text, first, second):
         assert point.gradient[i] == pytest.approx(slope, abs=1e-5)
         bend = (likelihood.at(found, weights + shift).gradient - likelihood.at(found, weights - shift).gradient) / -2
         assert likelihood.curvature(found, point)(np.eye(n)[i]) == pytest.approx(bend / step, abs=1e-5)
+
+
+def own_facts(names):
+    """Facts about constants of one database only."""
+    atoms = [f"{p}({', '.join(a)})" for p, n in (("S", 1), ("A", 2)) for a in itertools.product(names, repeat=n)]
+    return st.sets(st.sampled_from(atoms), min_size=1).map(lambda chosen: "\n".join(sorted(chosen)))
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.lists(st.sampled_from(QUANTIFIED), min_size=1, max_size=2, unique=True),
+    st.tuples(own_facts("JK"), own_facts("LMN"), own_facts("J")),
+)
+def test_quantifiers_range_over_the_constants_of_their_database(formulas, databases):
+    model, evidence, found = choices_of("S(p)\nA(p, p)\n" + "".join(f"1 {f}\n" for f in formulas), databases)
+    weights = np.random.default_rng(0).normal(size=sum(len(t.weights) for t in model.templates))
+    value = brute.pseudo_log_likelihood(with_weights(model, evidence, weights), evidence)
+    assert likelihood.at(found, weights).value == pytest.approx(value, abs=1e-9)
+
+
+def test_weights_without_bound_that_outgrow_each_other():
+    """The larger both weights the better, as long as the first is much larger than the second."""
+    model = ml.model_from_text("*B(p)\nA(p)\nB(x) => !A(x)\nA(x)")
+    data = ml.evidence_from_text("B(I)\n!A(I)\nA(K)", model=model)
+    learned = ml.learn(model, data, predict=["A"], prior=None)
+    assert learned.value == pytest.approx(0.0, abs=1e-5)
+    assert learned.unbounded.tolist() == [1, 1]
 
 
 @settings(max_examples=25, deadline=None)

@@ -6,7 +6,7 @@ the data gives the bindings in which that literal decides, and a count gathers t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from mlnlite.learn.data.separate import Case, cases
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import AtomRef, AtomSchema, Equal, Formula
 from mlnlite.model.propositional import Proposition, cubes
+from mlnlite.model.read import some_databases
 from mlnlite.model.symbols import Predicate
 from mlnlite.model.templates import Template
 
@@ -42,25 +43,47 @@ class Entries:
     change: Int64
 
 
-def entries(templates: Sequence[Template], evidence: Evidence, run: Run, targets: frozenset[str]) -> dict[str, Entries]:
+Load = Callable[[Evidence], Run]
+"""Makes the tables of evidence and of the templates' rows ready for plans."""
+
+
+def entries(
+    templates: Sequence[Template], evidence: Evidence, load: Load, targets: frozenset[str]
+) -> dict[str, Entries]:
     """The entries of all templates for the atoms of each target predicate.
 
     Args:
         templates: expanded.
         evidence: complete: every atom that is not a fact is false.
-        run: runs plans over the tables of the evidence and the templates' rows.
+        load: as said there.
         targets: predicates whose atoms are counted for.
     """
     found: dict[str, list[Entries]] = {name: [] for name in targets}
+    loaded: dict[bytes, tuple[Evidence, Run]] = {}
     first = 0
     for i, template in enumerate(templates):
-        source = source_of(i, template, evidence, "database" if evidence.n_databases > 1 else None)
-        for sign, case in _cases(source):
-            for target, (schema, _) in enumerate(case.literals):
-                if schema.predicate in targets:
-                    found[schema.predicate] += _counted(source, case, target, sign, first, run)
+        for databases in _alike(template, evidence):
+            if databases.tobytes() not in loaded:
+                part = evidence if len(databases) == evidence.n_databases else some_databases(evidence, databases)
+                loaded[databases.tobytes()] = part, load(part)
+            part, run = loaded[databases.tobytes()]
+            source = source_of(i, template, part, "database" if part.n_databases > 1 else None)
+            for sign, case in _cases(source):
+                for target, (schema, _) in enumerate(case.literals):
+                    if schema.predicate in targets:
+                        counted = _counted(source, case, target, sign, first, run)
+                        found[schema.predicate] += [replace(e, database=databases[e.database]) for e in counted]
         first += len(template.weights)
     return {name: _joined(parts, first) for name, parts in found.items()}
+
+
+def _alike(template: Template, evidence: Evidence) -> list[Int64]:
+    """Databases in groups that have the same constants where the formula has quantifiers."""
+    types = sorted({v.type for v in template.formula.variables if v.bound})
+    present = np.concatenate([np.zeros((evidence.n_databases, 0)), *(evidence.present[t] for t in types)], axis=1)
+    _, group = np.unique(present, axis=0, return_inverse=True)
+    group = group.ravel()
+    return [np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1)]
 
 
 def _cases(source: Source) -> Iterator[tuple[int, Case]]:

@@ -13,13 +13,14 @@ from mlnlite.errors import QueryMistake, did_you_mean
 from mlnlite.learn.evaluation import metrics
 from mlnlite.learn.evaluation.baselines import BASELINES, UNKNOWN, duplicates
 from mlnlite.learn.evaluation.evaluate import predictions, target_names, together
-from mlnlite.learn.evaluation.folds import By, Row, fact_texts, folds, groups, select, strata, without_facts
+from mlnlite.learn.evaluation.folds import By, Row, fact_texts, folds, groups, strata, without_facts
 from mlnlite.learn.evaluation.metrics import Predictions
 from mlnlite.learn.learned import Objective
 from mlnlite.learn.prior import PRIOR_SD, Prior
 from mlnlite.learn.weights import learn
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
+from mlnlite.model.read import some_databases
 
 Float = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -244,7 +245,7 @@ def _predicted(
         train, test = np.flatnonzero(fold != f), np.flatnonzero(fold == f)
         learned = learn(
             model,
-            select(databases, train),
+            some_databases(databases, train),
             objective=training.objective,
             predict=targets,
             open_predicates=training.open_predicates,
@@ -252,7 +253,7 @@ def _predicted(
         )
         closed = [n for n in conditions if n not in training.open_predicates]
         closed = [n for n in closed if databases.predicates[n].marker != "!"]
-        data = select(databases, test)
+        data = some_databases(databases, test)
         for i, found in predictions(learned.model, data, targets, closed).items():
             every[int(test[i])] = found
     return {name: _result(databases, name, conditions, every, fold, training) for name in targets}

@@ -21,19 +21,6 @@ MOST_STRATA = 50
 """Kinds of databases up to which folds are made alike."""
 
 
-def select(evidence: Evidence, chosen: Int64) -> Evidence:
-    """Some of the databases, in rising order of their numbers."""
-    number = np.full(evidence.n_databases, -1, np.int32)
-    number[chosen] = np.arange(len(chosen), dtype=np.int32)
-    facts = {}
-    for name, table in evidence.facts.items():
-        keep = number[table.database] >= 0
-        facts[name] = Facts(number[table.database[keep]], table.arguments[keep], table.truth[keep])
-    present = {name: p[chosen] for name, p in evidence.present.items()}
-    names = tuple(evidence.names[i] for i in chosen.tolist())
-    return replace(evidence, facts=facts, present=present, n_databases=len(chosen), names=names)
-
-
 def without_facts(evidence: Evidence, predicates: Iterable[str]) -> Evidence:
     """The databases without the facts about some predicates."""
     facts = dict(evidence.facts)

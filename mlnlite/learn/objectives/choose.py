@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.choose import engine_for
-from mlnlite.engines.plan import Engine
+from mlnlite.engines.plan import Engine, Run
 from mlnlite.errors import LimitReached, QueryMistake
 from mlnlite.ground.ground import row_tables
 from mlnlite.ground.tables import tables_of
@@ -152,8 +152,11 @@ def _template(model: Model, name: str) -> int:
 def pseudo_listed(model: Model, databases: Evidence, targets: frozenset[str], engine: Engine | None) -> list[Listed]:
     """The choices of the pseudo-likelihood one by one; the model is expanded."""
     evidence = closed(databases, databases.predicates)
-    tables = {**tables_of(evidence), **row_tables(model)}
-    found = entries(model.templates, evidence, (engine or engine_for()).load(tables), targets)
+
+    def load(some: Evidence) -> Run:
+        return (engine or engine_for()).load({**tables_of(some), **row_tables(model)})
+
+    found = entries(model.templates, evidence, load, targets)
     return listed(found, evidence, sum(len(t.weights) for t in model.templates))
 
 

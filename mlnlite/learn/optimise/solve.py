@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.infer.deadline import Deadline
+from mlnlite.learn.data.merge import Choices
 from mlnlite.learn.optimise.newton import Optimum, maximise
 from mlnlite.learn.optimise.problem import Problem, information, information_diagonal, log_likelihood, one_sided
 from mlnlite.learn.prior import Hierarchical, OnePrior, Penalty
@@ -17,6 +18,9 @@ Float = NDArray[np.float64]
 
 BOUND = 30.0
 """Largest size of a weight: odds of e^30, 10^13 to 1."""
+
+AGREE = 1e-6
+"""How much worse weights at their bounds may explain the data than weights without bounds."""
 
 GRADIENT = "largest gradient entry"
 
@@ -102,18 +106,45 @@ def start_of(problem: Problem) -> Float:
 
 
 def _without_prior(problem: Problem, penalty: Penalty, deadline: Deadline | None, start: Float) -> Solution:
-    """Weights that nothing holds go to the bound first, then the others are found."""
+    """Weights that nothing holds go to the bound first, then the others are found.
+
+    Where one weight would have to be larger than another that is itself without bound, only what nothing holds *by
+    itself* goes to the bound, and all others are looked for.
+    """
     found = problem.every
     unbounded, left = one_sided(found)
-    inner = np.flatnonzero(unbounded == 0)
-    rest = replace(found, rows=found.rows[left][:, inner], log_times=found.log_times[left], choice=found.choice[left])
-    part = replace(problem, every=rest, free=problem.free[inner])
-    optimum = best(part, penalty.of(part.free), start[inner], deadline)
-    x = BOUND * unbounded.astype(float)
-    x[inner] = optimum.x
-    at_bound = inner[np.abs(optimum.x) >= BOUND]
+    rest = replace(found, rows=found.rows[left], log_times=found.log_times[left], choice=found.choice[left])
+    x, optimum = _inside(problem, rest, unbounded, penalty, start, deadline)
+    value = log_likelihood(problem, x)[0]
+    if value < optimum.value - AGREE:
+        alone = np.where(
+            (found.rows.min(axis=0).toarray() >= 0) | (found.rows.max(axis=0).toarray() <= 0), unbounded, 0
+        )
+        x, optimum = _inside(problem, found, alone, penalty, start, deadline)
+        value = log_likelihood(problem, x)[0]
+    at_bound = np.abs(x) >= BOUND
     unbounded[at_bound] = np.sign(x[at_bound]).astype(np.int8)
-    return Solution(replace(optimum, x=x, value=log_likelihood(problem, x)[0]), unbounded, penalty)
+    return Solution(replace(optimum, x=x, value=value), unbounded, penalty)
+
+
+def _inside(
+    problem: Problem,
+    choices: Choices,
+    at_bound: NDArray[np.int8],
+    penalty: Penalty,
+    start: Float,
+    deadline: Deadline | None,
+) -> tuple[Float, Optimum]:
+    """All weights, some at the bound; and the optimum over the others by what some choices say."""
+    inner = np.flatnonzero(at_bound == 0)
+    x = BOUND * at_bound.astype(float)
+    log_times = choices.log_times - choices.rows @ x
+    part = replace(
+        problem, every=replace(choices, rows=choices.rows[:, inner], log_times=log_times), free=problem.free[inner]
+    )
+    optimum = best(part, penalty.of(part.free), start[inner], deadline)
+    x[inner] = optimum.x
+    return x, optimum
 
 
 # --- means and spreads that are learnt
