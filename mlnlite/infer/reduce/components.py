@@ -76,5 +76,7 @@ def rows_by_label(labels: Int32, n_labels: int) -> tuple[Int64, Int64]:
 
 def components_of(network: Network) -> Int32:
     """Component number of each variable of a network, by links between the open atoms of factors; see `labels_of`."""
-    scopes = [network.variable[np.abs(c.literals) - 1] for c in (*network.clauses, *network.counts)]
-    return labels_of(network.n_variables, [*scopes, *(network.variable[t.atoms] for t in network.tables)])
+    scopes = [network.variable[np.abs(c.literals) - 1] for c in network.clauses]
+    scopes += [network.variable[np.abs(c.literals) - 1] for c in network.counts]
+    scopes += [network.variable[t.atoms] for t in network.tables]
+    return labels_of(network.n_variables, scopes)
