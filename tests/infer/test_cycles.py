@@ -9,9 +9,10 @@ import mlnlite as ml
 from benchmarks import generators
 from mlnlite.engines.numpy import NumpyEngine
 from mlnlite.ground.lazy import world_evidence
-from mlnlite.infer.map.cuts import cycles
-from mlnlite.infer.map.cuts.cycles import pairs_of, violated_cycles
+from mlnlite.infer.map.cuts import cycles, walk_kernel
+from mlnlite.infer.map.cuts.cycles import pairs_of, violated_walks
 from mlnlite.infer.map.cuts.rows import Rows, with_rows
+from mlnlite.infer.map.cuts.walk_kernel import odd_walks
 from mlnlite.infer.map.ladder import map_of
 from mlnlite.infer.map.relaxation import bound_of, solve_program
 from mlnlite.infer.reduce.conjunctions import Cells
@@ -55,12 +56,14 @@ def test_cycles_hold_in_every_world_and_bounds_do(seed):
     rows, n_found = Rows(pairs.program.n_columns), 0
     for _ in range(20):
         x = rng.choice([0.0, 0.5, 0.5, 1.0], pairs.program.n_columns)
-        for columns, odd in violated_cycles(pairs, x):
-            assert (1 - x[columns[odd]]).sum() + x[columns[~odd]].sum() < 1
+        above, start, steps = violated_walks(pairs, x, np.arange(pairs.n), 1e-3)
+        for a, b, by in zip(start[:-1], start[1:], above, strict=True):
+            columns, odd = steps[a:b] // 2, steps[a:b] % 2 == 1
+            assert (1 - x[columns[odd]]).sum() + x[columns[~odd]].sum() <= 1 - by + 1e-9
             assert odd.sum() % 2 == 1
             assert ((1 - differ[:, columns[odd]]).sum(axis=1) + differ[:, columns[~odd]].sum(axis=1) >= 1).all()
             n_found += 1
-        cycles._separate(pairs, rows, x)
+        cycles._separate(pairs, rows, x, np.arange(pairs.n), 1e-3, 6)
     assert n_found
     program = with_rows(pairs.program, rows)
     best = max(value_of(part, w) for w in every)
@@ -68,6 +71,60 @@ def test_cycles_hold_in_every_world_and_bounds_do(seed):
     assert bound >= best - 1e-7
     assert bound_of(part, program, multipliers + rng.normal(0, 0.1, len(multipliers)))[0] >= best - 1e-9
     assert bound <= all_gains(part) + 1e-9
+
+
+def walks(start, end, x, source, hub):
+    """Length of the shortest odd closed walk through a node by Bellman and Ford, hub left out."""
+    distance = np.full((int(max(start.max(), end.max())) + 1, 2), np.inf)
+    distance[source, 0] = 0.0
+    for _ in range(2 * len(distance)):
+        for a, b, value in zip(start, end, x, strict=True):
+            for here, there in ((a, b), (b, a)):
+                for parity in range(2):
+                    if there != hub and here != hub:
+                        for odd, length in ((0, value), (1, 1 - value)):
+                            other = distance[here, parity] + length
+                            distance[there, parity ^ odd] = min(distance[there, parity ^ odd], other)
+    return distance[source, 1]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_walks_are_the_shortest_ones(seed):
+    rng = np.random.default_rng(seed)
+    ends = np.array([(a, b) for a in range(9) for b in range(a) if rng.random() < 0.4 or a == 8])
+    x = rng.choice([0.0, 0.1, 0.3, 0.5, 0.8, 1.0], len(ends))
+    start, end, column = (np.concatenate(a) for a in (ends.T, ends.T[::-1], [np.arange(len(ends))] * 2))
+    order = np.argsort(start, kind="stable")
+    begin = np.searchsorted(start[order], np.arange(10))
+    for source in range(8):
+        arguments = begin, end[order], column[order], x, np.array([source]), 8, 1e-3
+        above, _start, steps = odd_walks(*arguments)
+        length = walks(*ends.T, x, source, 8)
+        assert (1 - above).tolist() == pytest.approx([length] if length < 1 - 1e-3 else [])
+        assert (1 - x[steps[steps % 2 == 1] // 2]).sum() + x[steps[steps % 2 == 0] // 2].sum() <= length + 1e-9
+    for a, b in zip(odd_walks(*arguments[:4], np.arange(9), 8, 0.01), _plain(*arguments[:4]), strict=True):
+        np.testing.assert_allclose(a, b)
+
+
+def _plain(*arguments):
+    """The same as plain Python."""
+    saved = walk_kernel.explore, walk_kernel.close
+    walk_kernel.explore, walk_kernel.close = (f.py_func for f in saved)
+    try:
+        return odd_walks.py_func(*arguments, np.arange(9), 8, 0.01)
+    finally:
+        walk_kernel.explore, walk_kernel.close = saved
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_world_passes_what_an_ascent_over_cycles_proves(seed):
+    part = frustrated(seed, 10, 26)
+    pairs, rows = pairs_of(part), Rows(pairs_of(part).program.n_columns)
+    best = max(value_of(part, w) for w in worlds(part))
+    world, bound = cycles._ascend(pairs, rows, np.zeros(10, np.int64), (0.0, 0.0), cycles.FOREVER, seed)
+    least = solve_program(part, with_rows(pairs.program, rows), cycles.FOREVER, exact=True)[2]
+    assert value_of(part, world) <= best + 1e-9 <= bound + 2e-9
+    assert best - 1e-6 <= least <= bound + 1e-6
 
 
 def test_wider_cells_are_no_pairs():

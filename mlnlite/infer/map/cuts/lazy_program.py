@@ -15,7 +15,7 @@ import numpy as np
 from mlnlite.engines.plan import Engine
 from mlnlite.ground.network import Bool, Float, Int64
 from mlnlite.infer.map import ilp, relaxation
-from mlnlite.infer.map.cuts.ascent import ascend
+from mlnlite.infer.map.cuts.ascent import ascend, star_finder
 from mlnlite.infer.map.cuts.rows import Rows, add_clauses, add_stars, drop_slack, least_used, paid_so_far, with_rows
 from mlnlite.infer.map.cuts.separation import Reading, excuses, graph_of, lack, near_violations, stars
 from mlnlite.infer.map.cuts.waiting import Lazy, violated_weight
@@ -28,7 +28,7 @@ from mlnlite.infer.score import log_weight, truth_of
 
 _PER_COLUMN = 4
 _VIOLATED, _CLOSE = 1e-3, 1e-4
-_NEARLY, _LEAST_GAIN, _STALLED = 1e-3, 0.01, 4
+_NEARLY, _LEAST_GAIN, _STALLED, _SWEEPS = 1e-3, 0.01, 4, 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,10 +176,12 @@ def _ascend(search: _Search) -> None:
         return
     reduced = _prove(search, multipliers)
     bound, n = search.found.bound, base.columns.n
-    may = np.where((reduced[:n] < 0) | (x[:n] > _VIOLATED), 0.5, 0.0)
-    clauses = near_violations(search.lazy, base.reading, may, search.engine)
-    weights = search.lazy.network.weights
-    more = ascend(rows, clauses, weights, -reduced, options.seed, lambda lower: _is_enough(search, bound - lower))
+    may = np.where((reduced < 0) | (x > _VIOLATED), 0.5, 0.0)
+    clauses = near_violations(search.lazy, base.reading, may[:n], search.engine)
+    find = star_finder(rows, clauses, search.lazy.network.weights, may)
+    more = ascend(
+        rows, -reduced, find, lambda lower: _is_enough(search, bound - lower), seed=options.seed, sweeps=_SWEEPS
+    )
     _prove(search, np.append(multipliers, -more))
 
 

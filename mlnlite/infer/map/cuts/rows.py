@@ -103,10 +103,15 @@ def add_stars(rows: Rows, found: Stars, clauses: GroundClauses, weights: Float) 
 def append(rows: Rows, column: Int64, value: Float, limit: Float) -> None:
     """Adds rows of equal width; entries of value 0 are left out."""
     there = value != 0
-    rows.column = np.concatenate([rows.column, column[there]])
-    rows.value = np.concatenate([rows.value, value[there]])
+    append_rows(rows, there.sum(axis=1), column[there], value[there], limit)
+
+
+def append_rows(rows: Rows, size: Int64, column: Int64, value: Float, limit: Float) -> None:
+    """Adds rows of some sizes, one after the other."""
+    rows.column = np.concatenate([rows.column, column])
+    rows.value = np.concatenate([rows.value, value])
     rows.limit = np.concatenate([rows.limit, limit])
-    rows.start = np.concatenate([rows.start, rows.start[-1] + np.cumsum(there.sum(axis=1))])
+    rows.start = np.concatenate([rows.start, rows.start[-1] + np.cumsum(size)])
 
 
 def drop_slack(rows: Rows, x: Float, multipliers: Float) -> None:
