@@ -2,9 +2,9 @@
 
 A column says for each pair whether its atoms differ. Around a cycle an even number of pairs differ, so that for an odd
 set F of its pairs `sum in F - sum of the others <= |F| - 1`. Which of these inequalities a fractional solution
-violates, shortest paths tell in a graph with two copies of each atom. Coordinate ascent over many of them comes close to
-what they prove together, a linear program does the rest, an integer program follows. (Barahona and Mahjoub, On the cut
-polytope, Mathematical Programming 1986; an atom's own weight is a pair with one more atom that is always false.)
+violates, shortest paths tell in a graph with two copies of each atom. Coordinate ascent over many of them comes close
+to what they prove together, a linear program does the rest, an integer program follows. (Barahona and Mahjoub, On the
+cut polytope, Mathematical Programming 1986; an atom's own weight is a pair with one more atom that is always false.)
 """
 
 from __future__ import annotations
