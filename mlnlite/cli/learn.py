@@ -120,16 +120,16 @@ def learn(**options: Unpack[_Options]) -> None:
     if options["format"] == "json":
         where = {"model": text} if output is None else {"output": str(output)}
         more: dict[str, object] = {} if report is None else {"report": report.to_dict()}
-        more |= {} if unseen is None else {"held_out": unseen}
+        more |= {} if unseen is None else {"held_out": unseen[1]}
         click.echo(json.dumps({**learned.to_dict(), **more, **where}, indent=2))
         return
     summary = str(learned) if report is None else f"{learned}\n\n{report}\n"
-    summary += "" if unseen is None else f"\n{'held-out pseudo-log-likelihood':<36}{unseen:.6f} per atom or block"
+    summary += "" if unseen is None else f"\n{f'held-out {unseen[0]}':<36}{unseen[1]:.6f} per atom or block"
     click.echo(summary, err=output is None)
     click.echo(text if output is None else f"{'written to':<36}{output}", nl=output is not None)
 
 
-def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report | None, float | None]:
+def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report | None, tuple[str, float] | None]:
     """What was learnt, the report on it, and how probable other databases are."""
     import mlnlite as ml
 
@@ -156,13 +156,23 @@ def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report |
             time_limit=options["time_limit"],
         )
     method, held = options["report"], options["held_out"]
-    unseen = None if held is None else ml.held_out(learned, ml.read_evidence(held, model=learned.model))
+    unseen = None if held is None else _held_out(learned, held)
     if method is None:
         return learned, None, unseen
     from mlnlite.learn.trust.report import report
 
     with working("measuring"):
         return learned, report(learned, databases, method=method, seed=options["seed"]), unseen
+
+
+def _held_out(learned: LearnedModel, file: Path) -> tuple[str, float]:
+    """How probable the databases of a file are, and by which measure."""
+    import mlnlite as ml
+    from mlnlite.learn.trust.effects import has_unknown
+
+    databases = ml.read_evidence(file, model=learned.model)
+    measure = "log-likelihood" if has_unknown(learned, databases) else "pseudo-log-likelihood"
+    return measure, ml.held_out(learned, databases)
 
 
 def _database_weights(databases: Evidence, times: tuple[str, ...]) -> list[float] | None:

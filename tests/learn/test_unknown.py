@@ -90,3 +90,48 @@ def test_probabilities_are_refused():
     data = ml.evidence_from_text("0.7 S(A)\nS(B)", model=model)
     with pytest.raises(ml.EvidenceMistake, match="has a probability"):
         ml.learn(model, data)
+
+
+def test_held_out_sums_over_what_is_unknown():
+    facts, targets, marked = CASES[5]
+    model = ml.model_from_text(TEXT)
+    complete = ml.evidence_from_text(EVERY + "P(A)\nQ(B)\nG(A, C1)\nG(B, C2)\nO(A, C1)", model=model)
+    learned = ml.learn(model, complete, predict=targets, prior=1.0)
+    value = ml.held_out(learned, ml.evidence_from_text(EVERY + facts, model=learned.model))
+    assert value * 3 == pytest.approx(observed(learned.model, facts, targets, marked), abs=1e-8)  # P(A), P(B), O(A)
+
+
+def some_unknown():
+    """People, of whom some do not say whether they smoke."""
+    model = ml.model_from_text("S(p)\nC(p)\nS(x)\nC(x)\nS(x) ^ C(x)")
+    lines = [("S" * (i % 2) + "C" * (i % 5 > 1 + 2 * (i % 2)), i) for i in range(60)]
+    facts = [f"{'?' if n == 'S' and i % 7 == 0 else ''}{n}(P{i})" for names, i in lines for n in names]
+    facts += [f"?S(P{i})" for i in range(0, 60, 14)]
+    people = ", ".join(f"P{i}" for i in range(60))
+    return model, ml.evidence_from_text(f"p = {{{people}}}\n" + "\n".join(facts), model=model)
+
+
+def test_effects_where_atoms_are_unknown():
+    """The ratio is that of two models learnt apart; the score has the slope and curvature of the likelihood."""
+    model, data = some_unknown()
+    learned = ml.learn(model, data, prior=None)
+    assert learned.how.objective == "likelihood"
+    *_, effect = ml.effects(learned)
+    simple = replace(model, templates=model.templates[:2])
+    assert effect.ratio == pytest.approx(2 * (learned.value - ml.learn(simple, data, prior=None).value), abs=1e-6)
+    at = np.append(ml.learn(simple, data, prior=None).weights, 0.0)
+
+    def slope(x):
+        return log_likelihood(learned.problem, x)[1]
+
+    bend = -np.array([(slope(at + 1e-5 * e) - slope(at - 1e-5 * e)) / 2e-5 for e in np.eye(3)])
+    left = bend[2, 2] - bend[2, :2] @ np.linalg.solve(bend[:2, :2], bend[:2, 2])
+    assert effect.score == pytest.approx(slope(at)[2] ** 2 / left, rel=1e-4)
+    assert effect.p_value < 0.05
+
+
+def test_effects_refuse_what_has_no_likelihood():
+    model, _ = some_unknown()
+    complete = ml.evidence_from_text("S(A)\nC(A)\nS(B)\np = {A, B, C}", model=model)
+    with pytest.raises(ml.QueryMistake, match="max-margin"):
+        ml.effects(ml.learn(model, complete, predict=["C"], objective="max-margin"))

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mlnlite.errors import LimitReached, QueryMistake
-from mlnlite.learn.learned import LearnedModel
-from mlnlite.learn.objectives.choose import pseudo_problem
+from mlnlite.learn.data.merge import Choices
+from mlnlite.learn.data.missing import is_incomplete
+from mlnlite.learn.learned import LearnedModel, Objective
+from mlnlite.learn.objectives.choose import task_of
 from mlnlite.learn.optimise import information
 from mlnlite.learn.optimise.problem import Problem, log_likelihood
 from mlnlite.learn.optimise.solve import best
@@ -18,6 +20,7 @@ from mlnlite.learn.trust.advice import formula_of
 from mlnlite.model.evidence import Evidence
 
 Float = NDArray[np.float64]
+Int64 = NDArray[np.int64]
 
 MOST_TESTS = 2000
 """Weights up to which each is tested: one refit for each."""
@@ -32,9 +35,10 @@ class Effect:
         weight: the learnt weight.
         probability: of the formula's head given its body when nothing else speaks, `1 / (1 + e^-weight)`.
         ratio: twice the log of the likelihood ratio of the model with and without the formula, all else learnt anew.
-        score: Rao's score statistic at the model without it.
-        p_value: of the score statistic, chi-squared with one degree of freedom. Of the pseudo-likelihood of atoms that
-            depend on each other it is too small (Kent 1982).
+        score: Rao's score statistic at the model without it; nan where the likelihood is not concave there, as can be
+            if some atoms were unknown.
+        p_value: of the score statistic, or else of the ratio, chi-squared with one degree of freedom. Of the
+            pseudo-likelihood of atoms that depend on each other it is too small (Kent 1982).
     """
 
     formula: str
@@ -50,13 +54,16 @@ def effects(learned: LearnedModel) -> tuple[Effect, ...]:
 
     Raises:
         LimitReached: if there are too many.
-        QueryMistake: if some atoms were unknown in training, or components too wide to list.
+        QueryMistake: if components are too wide to list, or the weights are not those of a likelihood.
     """
     from scipy.stats import chi2
 
     problem = learned.problem
-    if problem.known is not None or problem.wide:
-        raise QueryMistake("formulas are tested on complete data with components that can be listed")
+    if learned.how.objective == "max-margin":
+        raise QueryMistake("formulas are tested by likelihood, which max-margin learning has none of")
+    if problem.wide:
+        hint = "learn by pseudo-likelihood, or predict fewer predicates"
+        raise QueryMistake("formulas are tested where components can be listed; these are too wide", hint)
     if len(problem.free) > MOST_TESTS:
         hint = "learn with a Laplace prior first, and drop the formulas with weight 0"
         raise LimitReached(f"each of {len(problem.free):,} weights would be a test; the limit is {MOST_TESTS:,}", hint)
@@ -67,7 +74,8 @@ def effects(learned: LearnedModel) -> tuple[Effect, ...]:
         ratio = 2 * (value - log_likelihood(problem, without)[0])
         score = score_statistic(problem, without, j)
         chance = float(1.0 / (1.0 + np.exp(-x[j])))
-        found.append(Effect(formula_of(learned, w), float(x[j]), chance, ratio, score, float(chi2.sf(score, 1))))
+        p_value = float(chi2.sf(ratio if np.isnan(score) else score, 1))
+        found.append(Effect(formula_of(learned, w), float(x[j]), chance, ratio, score, p_value))
     return tuple(found)
 
 
@@ -75,11 +83,15 @@ def _refitted(learned: LearnedModel, x: Float, column: int) -> Float:
     """The best free weights with one of them 0."""
     problem = learned.problem
     others = np.flatnonzero(np.arange(len(x)) != column)
-    rows = sparse.csr_array(problem.every.rows[:, others])
-    part = replace(problem, every=replace(problem.every, rows=rows), free=problem.free[others])
+    known = None if problem.known is None else _over(problem.known, others)
+    part = replace(problem, every=_over(problem.every, others), known=known, free=problem.free[others])
     result = np.zeros(len(x))
     result[others] = best(part, learned.penalty.of(part.free), x[others], None).x
     return result
+
+
+def _over(found: Choices, columns: Int64) -> Choices:
+    return replace(found, rows=sparse.csr_array(found.rows[:, columns]))
 
 
 def score_statistic(problem: Problem, x: Float, column: int) -> float:
@@ -87,26 +99,51 @@ def score_statistic(problem: Problem, x: Float, column: int) -> float:
 
     Rao, Large sample tests of statistical hypotheses concerning several parameters, 1948.
     """
-    bend = np.asarray(information.hessian(problem.every, x).todense(), float)
-    slope = float((problem.every.many @ information.expected_rows(problem.every, x))[column])
+    bend, slope = _bend(problem.every, x, column)
+    if problem.known is not None:
+        more, back = _bend(problem.known, x, column)
+        bend, slope = bend - more, slope - back
     others = np.flatnonzero(np.arange(len(x)) != column)
     coupled = bend[others, column]
     rest = np.linalg.pinv(bend[np.ix_(others, others)], hermitian=True)
     left = float(bend[column, column] - coupled @ rest @ coupled)
+    if left < -1e-9:
+        return np.nan
     return slope**2 / left if left > 1e-12 else 0.0
+
+
+def _bend(found: Choices, x: Float, column: int) -> tuple[Float, float]:
+    """Minus the Hessian, and minus the slope of one weight."""
+    slope = float((found.many @ information.expected_rows(found, x))[column])
+    return np.asarray(information.hessian(found, x).todense(), float), slope
+
+
+def has_unknown(learned: LearnedModel, databases: Evidence) -> bool:
+    """Whether databases leave atoms unknown that matter to a learnt model."""
+    return bool(learned.how.open_predicates) or is_incomplete(learned.model, databases, _targets(learned))
+
+
+def _targets(learned: LearnedModel) -> frozenset[str]:
+    return frozenset(learned.model.predicates if learned.how.predict is None else learned.how.predict)
 
 
 def held_out(learned: LearnedModel, databases: Evidence) -> float:
     """Pseudo-log-likelihood of databases that the model has not seen, per atom or block that is predicted.
 
+    Where atoms are unknown (see `has_unknown`), it is the log-likelihood of what is known.
+
     Args:
         learned: what `learn` gave.
-        databases: read for its model; complete.
+        databases: read for its model.
+
+    Raises:
+        LimitReached: if atoms are unknown, and components too wide for an exact likelihood.
     """
-    model = learned.model
+    model, targets = learned.model, _targets(learned)
     model = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
-    targets = frozenset(model.predicates if learned.how.predict is None else learned.how.predict)
-    free = tuple(replace(t, fixed=t.hard) for t in model.templates)
-    problem = pseudo_problem(replace(model, templates=free), databases, targets)
+    free = replace(model, templates=tuple(replace(t, fixed=t.hard) for t in model.templates))
+    objective: Objective = "likelihood" if has_unknown(learned, databases) else "pseudo-likelihood"
+    how = replace(learned.how, objective=objective, tied=(), database_weights=None)
+    problem = task_of(free, databases, how, targets, None).problem
     weights = np.concatenate([np.empty(0), *(t.weights for t in model.templates)])
     return log_likelihood(problem, weights[problem.free])[0] / max(1, problem.every.n_choices)

@@ -48,7 +48,7 @@ class Report:
         lines: of the weights that the data speak of, in the order of the model.
         uncertainty: their standard errors.
         advice: what to be careful of.
-        effects: tests of each formula, where the data are complete and the weights are few.
+        effects: tests of each formula, where components can be listed and the weights are few.
         correlated: pairs of formulas whose weights the data tell apart badly, with their correlation.
     """
 
@@ -116,7 +116,7 @@ def report(learned: LearnedModel, databases: Evidence, *, method: Method = "sand
 def _effects(learned: LearnedModel) -> tuple[Effect, ...]:
     """The tests of formulas, if there are few and their likelihood is in a list."""
     problem = learned.problem
-    listed = problem.known is None and not problem.wide and learned.how.objective != "max-margin"
+    listed = not problem.wide and learned.how.objective != "max-margin"
     return effects(learned) if listed and len(problem.free) <= MOST_LINES else ()
 
 
