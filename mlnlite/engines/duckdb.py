@@ -11,6 +11,7 @@ from weakref import finalize
 
 import numpy as np
 
+from mlnlite.engines.memory import machine_memory
 from mlnlite.engines.plan import Plan, Relation, Run, Tables, columns_of
 from mlnlite.engines.sql import query, quoted
 from mlnlite.errors import LimitReached
@@ -51,15 +52,23 @@ class DuckDBEngine:
 
         def run(plan: Plan) -> Relation:
             with self._bounded("a join"):
+                self._verify_size(connection, plan)
                 result = connection.execute(query(plan)).fetchnumpy()
             return {name: np.asarray(result[name]) for name in columns_of(plan)}
 
         finalize(run, _close, connection, scratch)
         return run
 
+    def _verify_size(self, connection: DuckDBPyConnection, plan: Plan) -> None:
+        """Refuses a plan whose rows are too many for memory: once they are arrays, the database does not bound them."""
+        ((n_rows,),) = connection.execute(f"SELECT count(*) FROM ({query(plan)})").fetchall()
+        limit = self.memory or machine_memory()
+        if limit is not None and n_rows * 8 * len(columns_of(plan)) > limit:
+            raise LimitReached(f"a join has {n_rows:,} rows, too many for {limit:,} bytes")
+
     @contextmanager
     def _bounded(self, what: str) -> Iterator[None]:
-        """Says what needed too much memory."""
+        """Says what needed too much memory, and that the user interrupted it, in words that others know."""
         import duckdb
 
         try:
@@ -67,6 +76,10 @@ class DuckDBEngine:
         except duckdb.OutOfMemoryException as error:
             limit = "there is" if self.memory is None else f"the limit of {self.memory:,} bytes"
             raise LimitReached(f"{what} needs more memory than {limit}") from error
+        except (duckdb.InterruptException, RuntimeError) as error:
+            if "interrupted" in str(error).lower():
+                raise KeyboardInterrupt from error
+            raise
 
 
 def _close(connection: DuckDBPyConnection, scratch: TemporaryDirectory[str]) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from pathlib import Path
 
 from mlnlite.engines.forecast import estimate
-from mlnlite.engines.plan import Tables
+from mlnlite.engines.memory import machine_memory
+from mlnlite.engines.plan import Plan, Relation, Run, Tables
 from mlnlite.errors import Diagnostic, LimitReached
 from mlnlite.ground.compile import Compiled, Source
 from mlnlite.model.templates import Template
@@ -54,12 +53,11 @@ class Limits:
 def forecast(template: Template, compiled: Compiled, tables: Tables) -> Forecast:
     """The forecast for a template's plan."""
     found = estimate(compiled.plan, tables)
-    width = len(compiled.atoms) + 2
     return Forecast(
         template=template,
         rows=found.rows,
         widest=found.widest,
-        memory=found.rows * width * BYTES_PER_VALUE,
+        memory=found.rows * _width(compiled) * BYTES_PER_VALUE,
         seconds=found.rows / ROWS_PER_SECOND + (found.widest - found.rows) / (10 * ROWS_PER_SECOND),
     )
 
@@ -81,13 +79,34 @@ def verify(expected: Forecast, source: Source, limits: Limits) -> None:
 
 def machine_limits() -> Limits:
     """The memory of the machine, or of the container; no limit where the system does not say."""
-    try:
-        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return Limits()
-    container = Path("/sys/fs/cgroup/memory.max")
-    given = container.read_text().strip() if container.exists() else ""
-    return Limits(memory=min(memory, int(given)) if given.isdigit() else memory)
+    return Limits(memory=machine_memory())
+
+
+def within(limits: Limits, compiled: Compiled, run: Run) -> Run:
+    """What runs the parts of a template's plan, and refuses the one with which their rows are beyond the limits.
+
+    Forecasts are estimates; this holds where they are wrong.
+    """
+    width, listed = _width(compiled), 0
+
+    def bounded(plan: Plan) -> Relation:
+        nonlocal listed
+        rows = run(plan)
+        listed += len(next(iter(rows.values()))) if rows else 1
+        if limits.groundings is not None and listed > limits.groundings:
+            raise LimitReached(f"it leaves more open than the limit of {limits.groundings:,} groundings")
+        if limits.memory is not None and listed * width * BYTES_PER_VALUE > limits.memory:
+            raise LimitReached(
+                f"it has at least {listed:,} ground formulas; the limit is {limits.memory / 1e6:,.0f} MB"
+            )
+        return rows
+
+    return bounded
+
+
+def _width(compiled: Compiled) -> int:
+    """Numbers of a ground row."""
+    return len(compiled.atoms) + 2
 
 
 def too_large(template: Template, source: Source, over: str) -> LimitReached:

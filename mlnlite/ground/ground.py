@@ -18,7 +18,7 @@ from mlnlite.ground.assemble import Part, network_of, sums_by
 from mlnlite.ground.blocks import Piece
 from mlnlite.ground.compile import Compiled, Source, atom_column, bindings, column, compiled, with_atom
 from mlnlite.ground.counting import counting_groups, counting_plan, plain_cubes
-from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, machine_limits, too_large, verify
+from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, machine_limits, too_large, verify, within
 from mlnlite.ground.groups import Group, groups_of
 from mlnlite.ground.network import Network
 from mlnlite.ground.residual import Decided, equalities_in
@@ -86,9 +86,11 @@ def _ground_source(source: Source, template: Template, run: Run, tables: Tables,
     plan = plan_of(source)
     if isinstance(plan, bool):
         return _constant(source, template, truth=plan)
-    if limits != NO_LIMITS or most_rows(plan.compiled.plan, tables) > UNCHECKED:
-        limits = machine_limits() if limits == NO_LIMITS else limits
+    if limits == NO_LIMITS and most_rows(plan.compiled.plan, tables) > UNCHECKED:
+        limits = machine_limits()
+    if limits != NO_LIMITS:
         verify(forecast(template, plan.compiled, tables), source, limits)
+        run = within(limits, plan.compiled, run)
     return _grounded(source, template, plan, run, tables)
 
 

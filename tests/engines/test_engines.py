@@ -19,6 +19,7 @@ from mlnlite.engines.plan import AntiJoin, Compute, Count, Join, Lookup, Project
 from mlnlite.ground.compile import bindings
 from mlnlite.ground.ground import prepared, source_of
 from mlnlite.model.propositional import cubes
+from tests.reference_engine import ReferenceEngine
 
 R, S = Scan("r", ("x", "y")), Scan("s", ("y", "z"))
 PLANS = [
@@ -60,9 +61,10 @@ def stored(draw):
 @settings(max_examples=15, deadline=None)
 @given(stored())
 def test_engines_agree(tables):
-    run, database = NumpyEngine().load(tables), DuckDBEngine().load(tables)
+    runs = [engine.load(tables) for engine in (NumpyEngine(), DuckDBEngine(), ReferenceEngine())]
     for plan in PLANS:
-        assert rows_of(run, plan) == rows_of(database, plan)
+        first, *others = (rows_of(run, plan) for run in runs)
+        assert all(first == other for other in others)
 
 
 @settings(max_examples=40, deadline=None)

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import time
+
 import pytest
 
 import mlnlite as ml
@@ -34,3 +40,64 @@ def test_what_no_machine_holds_is_refused_without_being_asked():
     assert machine_limits().memory is None or machine_limits().memory > 0
     with pytest.raises(ml.LimitReached, match="formula 2 needs"):
         ml.ground(model, ml.no_evidence(model))
+
+
+HUB = "*E(a, a)\nG(a, a, a)\n1 E(x, y) ^ E(y, z) => G(x, y, z)\n"
+"""Estimates take links to be spread evenly; here all go through one constant, and the join is 750 times as large."""
+
+
+@pytest.fixture
+def hub(tmp_path):
+    (tmp_path / "spilled").mkdir()
+    (tmp_path / "hub.mln").write_text(HUB)
+    (tmp_path / "hub.db").write_text("".join(f"E(A{i}, H)\nE(H, A{i})\n" for i in range(3000)))
+    (tmp_path / "all.mln").write_text(TEXT % ", ".join(f"P{i}" for i in range(3000)))
+    return tmp_path
+
+
+def command(folder, *arguments):
+    """A command whose temporary files go to a folder of their own."""
+    full = [sys.executable, "-m", "mlnlite", *arguments]
+    environment = {**os.environ, "TMPDIR": str(folder / "spilled")}
+    return subprocess.Popen(
+        full, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "culprit"),
+    [
+        (["all.mln", "--max-memory", "100MB"], "all.mln:5:1: error [E410]: formula 2 needs about"),
+        (
+            ["hub.mln", "-e", "hub.db", "--max-memory", "60MB"],
+            "hub.mln:3:1: error [E402]: formula 1 cannot be grounded",
+        ),
+        (["hub.mln", "-e", "hub.db", "--max-groundings", "99999"], "hub.mln:3:1: error [E402]: formula 1 cannot be"),
+    ],
+)
+def test_low_limits_end_in_a_message_that_names_the_culprit(hub, arguments, culprit):
+    with command(hub, "ground", *arguments) as process:
+        stdout, stderr = process.communicate(timeout=60)
+        assert (process.returncode, stdout) == (1, "")
+        assert stderr.startswith(culprit)
+        assert "range over" in stderr
+        assert "Traceback" not in stderr
+    assert list((hub / "spilled").iterdir()) == []
+
+
+def test_memory_stays_near_the_limit(hub):
+    with command(hub, "ground", "hub.mln", "-e", "hub.db", "--max-memory", "60MB") as process:
+        used = os.wait4(process.pid, 0)[2].ru_maxrss * 1024
+        process.returncode = 1
+    assert used < 400 * 10**6  # the join has a gigabyte
+
+
+def test_an_interrupted_join_leaves_no_files(hub):
+    with command(hub, "ground", "hub.mln", "-e", "hub.db", "--engine", "duckdb") as process:
+        while not list((hub / "spilled").iterdir()) and process.poll() is None:
+            time.sleep(0.05)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=60)
+        assert (process.returncode, stderr) == (130, "interrupted\n")
+    assert list((hub / "spilled").iterdir()) == []
