@@ -31,8 +31,10 @@ def has_marks(evidence: Evidence) -> bool:
     """
     for name, soft in evidence.soft.items():
         if soft.weight.any():
-            hint = "say whether it is true, or mark it unknown: `?`"
-            message = f"a fact about {name} has a probability; learning needs facts that are true, false, or unknown"
+            first = int(np.flatnonzero(soft.weight)[0])
+            atom = evidence.atom_text(int(evidence.atom_number(name, soft.arguments[[first]])[0]))
+            message = f"{atom} has a probability in {evidence.names[soft.database[first]]}"
+            hint = "learning needs facts that are true, false, or unknown: mark it `?`"
             raise EvidenceMistake([Diagnostic("E321", message, hint=hint)])
     return bool(evidence.soft)
 
