@@ -19,7 +19,7 @@ from mlnlite.cli.options import (
     open_world_option,
     output_option,
 )
-from mlnlite.cli.terminal import working
+from mlnlite.cli.terminal import warn, working
 from mlnlite.cli.worlds import closed_world, opened
 
 if TYPE_CHECKING:
@@ -68,6 +68,7 @@ def evaluate(**options: Unpack[_Options]) -> None:
         model = opened(ml.read_model(*options["models"], dialect=options["dialect"]), names(options["open_world"]))
         files = options["evidence"]
         evidence = ml.read_evidence(*files, model=model, together=len(files) > 1)
+    warn(evidence.warnings)
     closed = closed_world(model, labels, names(options["closed_world"]) or ["all"], names(options["open_world"]))
     with working("inferring"):
         found = ml.evaluate(model, evidence, predicates=labels, closed_world=closed)

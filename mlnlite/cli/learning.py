@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mlnlite.cli.options import FILE, Command
-from mlnlite.cli.terminal import working
+from mlnlite.cli.terminal import warn, working
 from mlnlite.errors import MlnError
 
 if TYPE_CHECKING:
@@ -127,6 +127,5 @@ def read(models: tuple[Path, ...], databases: tuple[Path, ...], dialect: Dialect
     with working("reading"):
         model = ml.read_model(*models, dialect=dialect)
         found = ml.read_evidence(*databases, model=model)
-    for warning in found.warnings:
-        click.echo(f"{warning}\n", err=True)
+    warn(found.warnings)
     return model, found

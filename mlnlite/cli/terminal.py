@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Timer
+
+import click
+
+from mlnlite.errors import Diagnostic
 
 PATIENCE = 1.0
 """Seconds of work after which it is announced."""
@@ -69,3 +73,9 @@ def shortened(words: Sequence[str], width: int) -> str:
             break
         kept.append(word)
     return f"{', '.join(kept)}, ... ({len(words) - len(kept):,} more)" if len(kept) < len(words) else text
+
+
+def warn(warnings: Iterable[Diagnostic]) -> None:
+    """Writes what reading found strange to standard error."""
+    for warning in warnings:
+        click.echo(f"{warning}\n", err=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mlnlite.cli.terminal import warn
 from mlnlite.errors import Diagnostic, MlnError, QueryMistake, did_you_mean
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ def evidence_of_one_world(model: Model, paths: Sequence[Path], database: int | N
     if not paths:
         return ml.no_evidence(model)
     evidence = ml.read_evidence(*paths, model=model, together=len(paths) > 1)
+    warn(evidence.warnings)
     n = evidence.n_databases
     if database is None and n > 1:
         raise MlnError(f"{paths[0]} has {n} databases, and a question is about one", "choose one: --database 1")

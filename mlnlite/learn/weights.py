@@ -41,18 +41,16 @@ def learn(  # noqa: PLR0913
 ) -> LearnedModel:
     """Weights that make the databases most likely.
 
-    The databases are complete but for atoms marked `?` and open predicates: an atom that is not a fact is false. By
-    default each atom, or block, is predicted from all others (pseudo-likelihood: Besag 1975; Richardson and Domingos
-    2006); where atoms are unknown, the likelihood of what is known is maximised. Ctrl-C leaves the best weights so far.
+    An atom that is not a fact is false, unless it is marked `?` or open. By default each atom, or block, is predicted
+    from all others (pseudo-likelihood: Besag 1975; Richardson and Domingos 2006); where atoms are unknown, the
+    likelihood of what is known is maximised. Ctrl-C leaves the best weights so far.
 
     Args:
         model: its weights are ignored, except fixed ones and hard formulas.
         databases: the data.
-        objective: `pseudo-likelihood`; `likelihood`, of all that is predicted together, by listing, elimination, or
-            sampling; `composite`, of pairs of atoms that share a formula, given the rest; `max-margin`, the world in
-            the data is to beat all others by the number of atoms in which they differ.
-        predict: predicates whose atoms are predicted; the others are only conditions (conditional likelihood). By
-            default all.
+        objective: `pseudo-likelihood`; `likelihood`, of all that is predicted together; `composite`, of pairs of atoms
+            that share a formula; `max-margin`: the data are to beat other worlds by the number of atoms that differ.
+        predict: predicates that are predicted, the others being conditions (conditional likelihood); by default all.
         open_predicates: predicates whose atoms are unknown where they are not facts; with `likelihood` only.
         prior: of the weights; a number is the standard deviation of a Gaussian with mean 0, None is no prior.
         tied: groups of formulas, by name (`formula 2`) or text, that have the same weights.
@@ -69,10 +67,8 @@ def learn(  # noqa: PLR0913
     """
     deadline, prior, start = in_seconds(time_limit), prior_of(prior), monotonic()
     targets, unknown = _names(model, predict, "predict"), _names(model, frozenset(open_predicates), "leave open")
-    objective = _objective(objective, unknown, incomplete=is_incomplete(model, databases, targets) or bool(unknown))
-    names, ties = None if predict is None else tuple(sorted(targets)), tuple(map(tuple, tied))
-    worth = None if database_weights is None else tuple(database_weights)
-    how = How(objective, names, tuple(sorted(unknown)), ties, worth)
+    objective, names = _objective(objective, unknown, model, databases, targets), None if predict is None else targets
+    how = _how(objective, names, unknown, tied, database_weights)
     model = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
     with interruptible(deadline):
         task = task_of(model, databases, how, targets, engine)
@@ -80,7 +76,24 @@ def learn(  # noqa: PLR0913
         solution = solved(model, task, prior, Search(_start(model) if resume else None, seed, deadline))
     learned = _learned(replace(model, types=_types(model, databases)), task.problem, solution)
     seconds = {"count": counted - start, "solve": monotonic() - counted}
-    return replace(learned, prior=prior, objective=_title(objective, predict is not None), how=how, seconds=seconds)
+    return replace(learned, prior=prior, objective=_title(how), how=how, seconds=seconds)
+
+
+def _how(
+    objective: Objective,
+    predict: frozenset[str] | None,
+    unknown: frozenset[str],
+    tied: Sequence[Sequence[str]],
+    database_weights: Sequence[float] | None,
+) -> How:
+    """What is to be learnt, as the learnt model remembers it."""
+    return How(
+        objective,
+        None if predict is None else tuple(sorted(predict)),
+        tuple(sorted(unknown)),
+        tuple(map(tuple, tied)),
+        None if database_weights is None else tuple(database_weights),
+    )
 
 
 def _start(model: Model) -> NDArray[np.float64]:
@@ -89,19 +102,22 @@ def _start(model: Model) -> NDArray[np.float64]:
     return np.where(np.isfinite(given), given, 0.0)
 
 
-def _title(objective: Objective, conditional: bool) -> str:
+def _title(how: How) -> str:
     """`conditional pseudo-log-likelihood`."""
     names = {"composite": "composite log-likelihood", "max-margin": "margin (minus the slack)"}
-    name = names.get(objective, objective.replace("likelihood", "log-likelihood"))
-    return f"conditional {name}" if conditional else name
+    name = names.get(how.objective, how.objective.replace("likelihood", "log-likelihood"))
+    return name if how.predict is None else f"conditional {name}"
 
 
-def _objective(given: str | None, unknown: frozenset[str], *, incomplete: bool) -> Objective:
+def _objective(
+    given: str | None, unknown: frozenset[str], model: Model, databases: Evidence, targets: frozenset[str]
+) -> Objective:
     """The objective: by default the cheapest that can take the data.
 
     Raises:
         QueryMistake: if there is no such objective, or it needs complete data.
     """
+    incomplete = is_incomplete(model, databases, targets) or bool(unknown)
     choices: tuple[Objective, ...] = get_args(Objective)
     chosen = next((c for c in choices if c == given), None) if given else choices[incomplete]
     if chosen is None:

@@ -1,13 +1,14 @@
-"""Warnings about databases that lack what the others have."""
+"""Warnings about databases that lack what the others have, and about constants that look like one and are two."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from mlnlite.errors import Diagnostic
 from mlnlite.model.evidence import Evidence
+from mlnlite.model.numbers import number_of
 
 
 def coverage(evidence: Evidence) -> tuple[Diagnostic, ...]:
@@ -26,3 +27,17 @@ def _warnings(evidence: Evidence) -> Iterator[Diagnostic]:
         message = f"{name} has no fact in {len(lacking)} of {evidence.n_databases} databases"
         hint = f"the first is {evidence.names[lacking[0]]}; learning takes what is not a fact as false"
         yield Diagnostic("W310", message, hint=hint, severity="warning")
+
+
+def same_number(constants: Sequence[str]) -> tuple[int, int] | None:
+    """The first two constants that name the same number, such as `3` and `3.0`, or None.
+
+    >>> same_number(["Anna", "3", "007", "3.0"])
+    (1, 3)
+    """
+    seen: dict[float, int] = {}
+    for i, name in enumerate(constants):
+        value = number_of(name) if name[:1].isdigit() or name[:1] == "-" else None
+        if value is not None and seen.setdefault(value, i) != i:
+            return seen[value], i
+    return None

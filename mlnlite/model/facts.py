@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count, filterfalse
 from typing import ClassVar, TypeVar
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean, in_order
+from mlnlite.model.coverage import same_number
 from mlnlite.model.derived import compared, verify_constants
 from mlnlite.model.evidence import Evidence, Facts, SoftFacts
 from mlnlite.model.model import Model
@@ -133,9 +134,34 @@ def check_evidence(
         present,
         n_databases,
         ("evidence",) if together else (*names, *["tables"] * tabled),
+        warnings=tuple(_two_names(reading, result_types)),
         soft=_softened(reading, facts, model),
         cuts=reading.cuts,
     )
+
+
+def _two_names(reading: _Reading, types: Mapping[str, Type]) -> Iterator[Diagnostic]:
+    """A warning for each type of which two constants name the same number."""
+    for name, t in types.items():
+        pair = same_number(t.constants)
+        if pair is None:
+            continue
+        first, second = (t.constants[i] for i in pair)
+        message = f"{first} and {second} are different constants of the type {name}, though the same number"
+        hint = "constants are names; write a number the same way everywhere"
+        yield Diagnostic("W313", message, _mention_of(pair[1], name, reading), hint, severity="warning")
+
+
+def _mention_of(constant: int, type_name: str, reading: _Reading) -> Span | None:
+    """The first fact in which a constant stands, if it stands in one that is certain."""
+    for name, columns in reading.columns.items():
+        arguments = _joined(columns.arguments)
+        for i, t in enumerate(reading.predicates[name].types):
+            rows = np.flatnonzero(arguments[:, i] == constant)
+            if t == type_name and len(rows):
+                file, offset = place(columns, int(rows[0]))
+                return _fact_span(reading.sources[file], offset)
+    return None
 
 
 def _name(program: EvidenceProgram | TableFacts) -> str:

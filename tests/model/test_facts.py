@@ -38,3 +38,20 @@ def test_places_of_contradictions():
         ml.evidence_from_text(text, model=model)
     found = [(d.code, d.span.line, d.message[-10:]) for d in caught.value.diagnostics]
     assert found == [("E304", 3, "<text>:1:1"), ("E305", 6, "<text>:4:1")]
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("Level(A, 3)\nLevel(B, 2)\nLevel(C, 3.0)", 3),
+        ("n = {7, 007}\nLevel(A, 1)", None),
+        ("Level(A, 3)\n0.5 Level(B, 3.0)", None),
+        ("Level(A, 3)\nLevel(3.0, 4)\nLevel(B, three)", 0),
+    ],
+)
+def test_two_names_of_a_number(text, place):
+    """Constants are names; that two of a type look like one number is said, with the place if it is in a fact."""
+    model = ml.model_from_text("Level(o, n)\nLevel(x, 1)")
+    warnings = ml.evidence_from_text(text, model=model).warnings
+    assert [w.code for w in warnings] == ["W313"] * (place != 0)
+    assert [w.span and w.span.line for w in warnings] == [place] * (place != 0)

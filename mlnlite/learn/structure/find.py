@@ -122,11 +122,7 @@ def find_rules(
     every = model_from_text("\n".join([model_text(model), *units, *rules]), dialect=model.dialect)
     every = replace(every, templates=tuple(t.expanded(databases.types) for t in every.templates))
     problem = pseudo_problem(every, databases, frozenset(targets))
-    column_of = {int(w): j for j, w in enumerate(problem.free)}
-    n_weights = sum(len(t.weights) for t in every.templates)
-    tried = {
-        column_of[w]: r for w, r in zip(range(n_weights - len(rules), n_weights), rules, strict=True) if w in column_of
-    }
+    tried = _columns(problem, rules)
     found = _search(problem, tried, most_rules)
     kept = _stability(problem, tried, most_rules, (resamples, seed))
     made = [
@@ -134,6 +130,12 @@ def find_rules(
     ]
     result = model_from_text("\n".join([model_text(model), *units, *(r.text for r in made)]), dialect=model.dialect)
     return Structure(tuple(made), result, len(rules))
+
+
+def _columns(problem: Problem, rules: Sequence[str]) -> dict[int, str]:
+    """The columns of the problem that are rules; those have the last weights, and some may not matter."""
+    first = len(problem.weights) - len(rules)
+    return {j: rules[w - first] for j, w in enumerate(problem.free.tolist()) if w >= first}
 
 
 def _unit(model: Model, name: str) -> str:
