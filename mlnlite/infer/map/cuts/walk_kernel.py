@@ -63,12 +63,12 @@ def close(begin, other, column, x, reached, every, distance, total, ends):  # ty
         distance: as `explore` leaves it.
         total: shape (m,), longest walk of interest; filled in here, as are both ends and twice the column (1 more if
             odd).
-        ends: shape (m, 3).
+        ends: shape (m, 3), -1.
 
     Returns:
         Where something was found.
     """
-    found = set(reached[:0])
+    found = reached[:0]
     for a in reached:
         for i in range(begin[a // 2], begin[a // 2 + 1]):
             slot = column[i] if every else 0
@@ -76,9 +76,10 @@ def close(begin, other, column, x, reached, every, distance, total, ends):  # ty
                 b = 2 * other[i] + (1 - ((a & 1) ^ odd))
                 length = distance[a] + distance[b] + (1 - x[column[i]] if odd else x[column[i]])
                 if length < total[slot]:
-                    found.add(slot)
+                    if ends[slot, 0] < 0:
+                        found.append(slot)
                     total[slot], ends[slot, 0], ends[slot, 1], ends[slot, 2] = length, a, b, 2 * column[i] + odd
-    return sorted(found)
+    return found
 
 
 @compiled
@@ -120,7 +121,7 @@ def odd_walks(begin, other, column, x, sources, hub, least):  # type: ignore[no-
                     steps.append(2 * by[path[i]] + ((path[i] ^ path[i + 1]) & 1))
             above.append(1 - total[slot])
             start.append(len(steps))
-            total[slot] = 1 - least
+            total[slot], ends[slot, 0] = 1 - least, -1
         for a in reached:
             distance[a], before[a], by[a] = np.inf, -1, -1
     return np.array(above), np.array(start), np.array(steps)
