@@ -33,7 +33,8 @@ def ordered(facts: Facts, sizes: Sequence[int]) -> tuple[Facts, NDArray[np.bool_
     again = np.zeros(len(numbers), np.bool_)
     ranked = bool((numbers[1:] >= numbers[:-1]).all())
     rest = numbers if ranked else np.sort(numbers)
-    again[1:] = (rest[1:] ^ rest[:-1]) <= 1
+    for block in blocks(len(rest) - 1):
+        again[1:][block] = (rest[1:][block] ^ rest[:-1][block]) <= 1
     return facts if ranked else _facts(rest, bits), again, lambda: np.argsort(numbers, kind="stable")
 
 

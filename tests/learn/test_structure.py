@@ -123,3 +123,10 @@ def test_no_candidate_is_refused():
     data = ml.evidence_from_text("S(A)\nH(B)", model=model)
     with pytest.raises(ml.QueryMistake, match="no rule to try"):
         find_rules(model, data, predict=["S"], given=["H"])
+
+
+def test_unknown_atoms_are_refused():
+    model = ml.model_from_text("S(p)\nC(p)\n")
+    data = ml.evidence_from_text("S(A)\n?C(A)\nC(B)", model=model)
+    with pytest.raises(ml.QueryMistake, match="complete data"):
+        find_rules(model, data, predict=["C"])

@@ -82,7 +82,8 @@ def pairs(network: Network) -> list[Int64]:
 
 def n_worlds(network: Network, part: Int64) -> float:
     """Number of worlds of a part."""
-    return float(np.prod(network.cardinality[part].astype(float)))
+    with np.errstate(over="ignore"):  # infinitely many are too many to list, too
+        return float(np.prod(network.cardinality[part].astype(float)))
 
 
 def list_worlds(network: Network, values: Int64, parts: Sequence[Int64], excluded: Int64) -> Worlds:

@@ -18,6 +18,7 @@ from scipy.stats import chi2
 
 from mlnlite.errors import QueryMistake
 from mlnlite.learn.data.merge import Choices
+from mlnlite.learn.data.missing import has_marks
 from mlnlite.learn.evaluation.evaluate import target_names
 from mlnlite.learn.objectives.choose import pseudo_problem
 from mlnlite.learn.optimise import information
@@ -109,11 +110,14 @@ def find_rules(
         seed: of the bootstrap.
 
     Raises:
-        QueryMistake: if there is no candidate, or a mode does not fit.
+        QueryMistake: if there is no candidate, a mode does not fit, or an atom is unknown.
     """
     heads = modes_of(predict, model.predicates)
     bodies = modes_of(model.predicates if given is None else given, model.predicates)
     targets = target_names(databases, {mode.predicate: None for mode in heads})
+    if has_marks(databases):
+        hint = "weights can be learnt with unknown atoms; to look for rules, decide whether they are true"
+        raise QueryMistake("rules are looked for in complete data, and these leave atoms unknown", hint)
     found_rules = candidates(Language(model.predicates, databases.types, heads, bodies), most_literals)
     rules = [rule_text(rule, model.dialect) for rule in found_rules]
     units = [_unit(model, name) for name in targets if not _has_unit(model, name)]
