@@ -18,8 +18,10 @@ from scipy.sparse.csgraph import connected_components
 
 from mlnlite.ground.network import Bool, Float, Int64
 from mlnlite.infer.deadline import FOREVER, Deadline
+from mlnlite.infer.map.count_rows import Pieces, pieces_of
 from mlnlite.infer.reduce.conjunctions import Cells
 from mlnlite.infer.reduce.costs import with_costs
+from mlnlite.infer.reduce.counting import Chains
 from mlnlite.infer.reduce.dominance import merged
 from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains
 
@@ -30,7 +32,10 @@ _FEWEST = 4
 
 @dataclass(slots=True)
 class Program:
-    """A program under construction: minimise the costs of columns so that rows stay within their limits."""
+    """A program under construction: minimise the costs of columns so that rows stay within their limits.
+
+    The columns of variables come first and are integer; of the others those in `binary` are.
+    """
 
     cost: list[Float]
     upper: list[Float]
@@ -41,6 +46,7 @@ class Program:
     column: list[Int64] = field(default_factory=list)
     value: list[Float] = field(default_factory=list)
     limit: list[Float] = field(default_factory=list)
+    binary: list[int] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +138,8 @@ def program_of(part: Part) -> tuple[Program, Columns]:
     for cells in map(merged, part.cells):
         for rest in _without_cliques(program, columns, cells):
             _add_cells(program, columns, rest)
+    for chains in part.chains:
+        _add_counts(program, columns, chains)
     return program, columns
 
 
@@ -181,10 +189,10 @@ def add_rows(program: Program, column: Int64, value: Float, limit: Float) -> Non
     program.n_rows += n
 
 
-def _add_columns(program: Program, cost: Float, upper: float) -> Int64:
+def _add_columns(program: Program, cost: Float, upper: float | Float) -> Int64:
     """Adds columns between 0 and `upper`; returns their numbers."""
     program.cost.append(cost)
-    program.upper.append(np.full(len(cost), upper))
+    program.upper.append(np.broadcast_to(upper, len(cost)).astype(float))
     program.n_columns += len(cost)
     return np.arange(program.n_columns - len(cost), program.n_columns)
 
@@ -216,6 +224,49 @@ def _add_cells(program: Program, columns: Columns, cells: Cells) -> None:
     for c in range(column.shape[1]):
         pair = np.stack([extra, column[pays, c]], axis=1)
         add_rows(program, pair, np.stack([np.ones(len(extra)), -sign[pays, c]], axis=1), add[pays, c])
+
+
+def _add_counts(program: Program, columns: Columns, chains: Chains) -> None:
+    """The costs of counting factors: each count is the first possible one and what is filled of the pieces after it."""
+    column, sign, add = literals(columns, chains.variable.astype(np.int64), chains.value.astype(np.int64))
+    sign = np.where(chains.equal, sign, -sign) * chains.steps
+    add = (np.where(chains.equal, add, 1 - add) * chains.steps).sum(axis=1)
+    for rows, worth in chains.scaled():
+        pieces = pieces_of(worth, chains.steps)
+        for row in rows.tolist():
+            if pieces is None:
+                add_rows(program, column[row, None, :1], np.zeros((1, 1)), np.array([-1.0]))
+                continue
+            filled = _add_pieces(program, pieces)
+            whole = np.append(column[row], filled)[None]
+            value = np.append(sign[row], np.full(len(filled), -1.0))[None]
+            limit = np.array([pieces.first - add[row]])
+            add_rows(program, whole, value, limit)
+            add_rows(program, whole, -value, -limit)
+
+
+def _add_pieces(program: Program, pieces: Pieces) -> Int64:
+    """Columns for the pieces of a cost, those of one run full before the next one begins."""
+    program.offset += pieces.cost
+    filled = _add_columns(program, pieces.slope, pieces.length)
+    for run in range(1, int(pieces.run.max(initial=0)) + 1):
+        full = _add_binary(program)
+        for which, sign in ((run - 1, -1.0), (run, 1.0)):
+            mine = np.flatnonzero(pieces.run == which)
+            value = np.append(np.full(len(mine), sign), -sign * pieces.length[mine].sum())
+            add_rows(program, np.append(filled[mine], full)[None], value[None], np.zeros(1))
+    for i in np.flatnonzero(pieces.jump).tolist():
+        pair, value = np.array([[filled[i], _add_binary(program)]]), np.array([[1.0, -pieces.length[i]]])
+        add_rows(program, pair, value, np.zeros(1))
+        add_rows(program, pair, -value, np.zeros(1))
+    return filled
+
+
+def _add_binary(program: Program) -> int:
+    """Adds a column that is 0 or 1."""
+    (column,) = _add_columns(program, np.zeros(1), 1.0).tolist()
+    program.binary.append(column)
+    return int(column)
 
 
 def _without_cliques(program: Program, columns: Columns, cells: Cells) -> Iterator[Cells]:
@@ -271,6 +322,8 @@ def model_of(program: Program, n_integer: int) -> highspy.HighsLp:
     model.a_matrix_.start_, model.a_matrix_.index_ = matrix.indptr, matrix.indices
     model.a_matrix_.value_ = matrix.data
     kinds = [highspy.HighsVarType.kInteger] * n_integer + [highspy.HighsVarType.kContinuous] * (shape[1] - n_integer)
+    for column in program.binary if n_integer else ():
+        kinds[column] = highspy.HighsVarType.kInteger
     model.integrality_ = kinds
     return model
 

@@ -22,7 +22,7 @@ from mlnlite.infer.map.twins import twins_of
 from mlnlite.infer.reduce.components import labels_of
 from mlnlite.infer.reduce.dominance import without_dominated
 from mlnlite.infer.reduce.equivalence import contracted, put_back_ties
-from mlnlite.infer.reduce.narrow import narrowed
+from mlnlite.infer.reduce.narrow import narrowed, written
 from mlnlite.infer.reduce.parts import SMALL, Batch, Part, PartAnswer, all_gains, batches, divide, parts, value_of
 from mlnlite.infer.reduce.peel import Leaves, changed_by, peel, put_back_labels, put_back_values
 from mlnlite.infer.reduce.potentials import Potentials, potentials_of
@@ -111,7 +111,7 @@ def map_of(
     deadline = in_seconds(time_limit)
     options = Options(method, deadline, seed, gap)
     with interruptible(deadline):
-        tied, ties = contracted(potentials_of(network, max_arity=np.inf))
+        tied, ties = contracted(potentials_of(network, max_arity=np.inf, chained=True))
         leaves: tuple[Leaves, ...] = ()
         found = _at_once(tied, options)
         if found is None:
@@ -129,7 +129,7 @@ def map_of(
 
 def _at_once(potentials: Potentials, options: Options) -> tuple[_Search, Int32] | None:
     """A minimum cut through a large network as a whole, if all of it attracts: quicker than component by component."""
-    n_cells = sum(len(c.amount) for c in potentials.cells)
+    n_cells = 0 if potentials.chains else sum(len(c.amount) for c in potentials.cells)
     if options.method not in ("auto", mincut.MINCUT) or n_cells < _AT_ONCE or np.isneginf(potentials.constant):
         return None
     n = len(potentials.cardinality)
@@ -212,20 +212,21 @@ def _list_worlds(batch: Batch, search: _Search) -> None:
 
 def _eliminate(part: Part, method: Method, width_limit: int, search: _Search) -> bool:
     """Best world of a large component, if its tables are affordable."""
-    largest, total = width_limit, max(MEMORY_LIMIT, width_limit)
+    largest, total, n = width_limit, max(MEMORY_LIMIT, width_limit), len(part.variables)
+    part, constant = written(part)
     if method == "auto":
         largest, total = min(width_limit, _CHEAP), _CHEAP_IN_ALL
         n_cells = sum(len(c.amount) for c in part.cells if c.scope.shape[1] > 1)
-        if n_cells > (_DENSE if len(part.variables) < _MANY else _SPARSE) * len(part.variables):
+        if n_cells > (_DENSE if n < _MANY else _SPARSE) * len(part.cardinality):
             return False
-    n, part = len(part.variables), narrowed(part)
+    part = narrowed(part)
     tree = plan(part.cardinality, [c.scope for c in part.cells], largest, total)
     if isinstance(tree, TooWide):
         search.wide.append((part, tree))
         return False
     value, world = best_world(tree, part.cardinality, part.cells)
     search.values[part.variables] = world[:n]
-    search.best[part.component] = value
+    search.best[part.component] = value + constant
     search.method[part.component] = ELIMINATION
     search.largest_table = max(search.largest_table, *tree.sizes)
     return True

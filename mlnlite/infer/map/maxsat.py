@@ -13,6 +13,7 @@ import numpy as np
 
 from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.reduce.conjunctions import starts_of
+from mlnlite.infer.reduce.narrow import read_back, written
 from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains
 from mlnlite.infer.workers.ask import Ask
 
@@ -29,16 +30,18 @@ def solve_part(part: Part, ask: Ask, deadline: Deadline) -> PartAnswer:
         ask: what runs the solver.
         deadline: when to give up; RC2 has no world before it is done.
     """
-    problem, scale, error = _problem(part)
+    plain, constant = written(part)
+    problem, scale, error = _problem(plain)
     reply = ask("_rc2_worker", problem, deadline)
     if reply is None or reply["state"] is None:
         return PartAnswer(None, all_gains(part), False, MAXSAT)
-    first = starts_of(part.cardinality)
-    true = np.zeros(int(part.cardinality.sum()) + 1, np.bool_)
+    first = starts_of(plain.cardinality)
+    true = np.zeros(int(plain.cardinality.sum()) + 1, np.bool_)
     state = np.array(reply["state"], np.int64)
     true[[x for x in state[state > 0].tolist() if x < len(true)]] = True
-    world = np.array([int(true[b + 1 : b + 1 + k].argmax()) for b, k in zip(first, part.cardinality, strict=True)])
-    return PartAnswer(world, all_gains(part) - reply["cost"] / scale + error, True, MAXSAT)
+    world = np.array([int(true[b + 1 : b + 1 + k].argmax()) for b, k in zip(first, plain.cardinality, strict=True)])
+    answer = PartAnswer(world, all_gains(plain) - reply["cost"] / scale + error, True, MAXSAT)
+    return read_back(answer, part, constant)
 
 
 def _problem(part: Part) -> tuple[dict[str, Any], float, float]:

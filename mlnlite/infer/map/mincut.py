@@ -65,11 +65,11 @@ class Cut:
 
 
 def quadratic(part: Part) -> Quadratic | None:
-    """A component as a quadratic function; None if it has cells of three literals, or blocks.
+    """A component as a quadratic function; None if it has cells of three literals, counting factors or blocks.
 
     What is forbidden costs more than everything else together.
     """
-    if any(c.scope.shape[1] > 2 for c in part.cells) or (part.cardinality > 2).any():
+    if part.chains or any(c.scope.shape[1] > 2 for c in part.cells) or (part.cardinality > 2).any():
         return None
     n, amounts = len(part.variables), np.concatenate([np.zeros(0), *(c.amount for c in part.cells)])
     soft = np.isfinite(amounts)

@@ -121,6 +121,8 @@ def _ladder(part: Part, options: Options, ask: Ask) -> list[Rung]:
     widest = max((c.scope.shape[1] for c in part.cells), default=0)
     mixed = bool((part.cardinality > 2).any()) or widest == 3
     last: list[Rung] = [*single["annealing"][:1], *single["ilp"]]
+    if part.chains:
+        return [_trying_ilp(options), *tried, *last]
     if widest <= 2 and not mixed and len(part.variables) <= _CYCLES_UP_TO:
         return [_by_mincut, *tried, *single["annealing"][:1], _cycles(options), *single["ilp"]]
     if len(part.variables) <= _FEW and mixed:

@@ -9,6 +9,7 @@ from pysat.solvers import Solver
 
 from mlnlite.ground.network import Int64
 from mlnlite.infer.reduce.conjunctions import starts_of
+from mlnlite.infer.reduce.narrow import written
 from mlnlite.infer.reduce.parts import Part
 
 
@@ -21,16 +22,20 @@ def feasible_world(part: Part) -> Int64 | None:
     Returns:
         Shape (n,), or None if there is none.
     """
-    first = starts_of(part.cardinality) + 1
+    plain, constant = written(part)
+    if np.isneginf(constant):
+        return None
+    first = starts_of(plain.cardinality) + 1
     with Solver(name="cadical153") as solver:
-        for begin, size in zip(first.tolist(), part.cardinality.tolist(), strict=True):
+        for begin, size in zip(first.tolist(), plain.cardinality.tolist(), strict=True):
             solver.add_clause(list(range(begin, begin + size)))
             for a, b in combinations(range(begin, begin + size), 2):
                 solver.add_clause([-a, -b])
-        for cells in part.cells:
+        for cells in plain.cells:
             hard = np.isneginf(cells.amount)
             solver.append_formula((-(first[cells.scope[hard]] + cells.value[hard])).tolist())
         if not solver.solve():
             return None
         true = np.array(solver.get_model()) > 0
-    return np.array([int(true[b - 1 : b - 1 + k].argmax()) for b, k in zip(first, part.cardinality, strict=True)])
+    own = zip(first, part.cardinality, strict=False)
+    return np.array([int(true[b - 1 : b - 1 + k].argmax()) for b, k in own])

@@ -15,6 +15,7 @@ from mlnlite.errors import MissingPart
 from mlnlite.ground.network import Float
 from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.narrow import read_back, written
 from mlnlite.infer.reduce.parts import Part, PartAnswer
 from mlnlite.infer.workers.ask import Ask
 
@@ -44,13 +45,14 @@ def solve_part(part: Part, ask: Ask, deadline: Deadline, seed: int = 0, *, backt
     """
     if not is_available():
         raise MissingPart("toulbar2 is not installed", hint="pip install pytoulbar2 (not made for Windows)")
-    problem, scale, rounding = _problem(part)
+    plain, constant = written(part)
+    problem, scale, rounding = _problem(plain)
     left = deadline.left
     problem |= {"seconds": max(1, int(min(left, _LONGEST))), "seed": seed + 1, "backtracks": backtracks}
     reply = ask("_toulbar2_worker", problem, deadline) or {"state": None, "bound": None, "optimal": False}
     world = None if reply["state"] is None else np.array(reply["state"], np.int64)
     bound = np.inf if reply["bound"] is None else -reply["bound"] / scale + rounding
-    return PartAnswer(world, bound, bool(reply["optimal"]), WCSP)
+    return read_back(PartAnswer(world, bound, bool(reply["optimal"]), WCSP), part, constant)
 
 
 def _problem(part: Part) -> tuple[dict[str, object], float, float]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlnlite.ground.isomorphism import copies
-from mlnlite.ground.network import Clauses, Int32, Int64, Network
+from mlnlite.ground.network import Clauses, Counts, Int32, Int64, Network
 from mlnlite.infer.reduce.conjunctions import starts_of
 from mlnlite.infer.reduce.parts import Part
 from mlnlite.model.evidence import Evidence
@@ -70,6 +70,14 @@ def _as_network(parts: Sequence[Part], first: Int64, cardinality: Int32, start: 
         literals = (start[c.scope.astype(np.int64) + begin] + c.value + 1).astype(np.int32)
         own, row = np.split(row, [len(literals)])
         clauses.append(Clauses(literals, own, np.ones(len(own), np.int64)))
+    counts = []
+    for begin, chains in [(b, c) for b, part in zip(first.tolist(), parts, strict=False) for c in part.chains]:
+        atoms = start[chains.variable.astype(np.int64) + begin] + chains.value + 1
+        literals = np.where(chains.equal, atoms, -atoms).astype(np.int32)
+        own = np.arange(len(weights), len(weights) + len(literals), dtype=np.int32)
+        bits = chains.worth.astype(float).view(np.int64)  # only to be told apart
+        counts.append(Counts(literals, bits, own, np.ones(len(own), np.int64), chains.steps))
+        weights = np.concatenate([weights, chains.scale])
     n_atoms = int(start[-1])
     variable = np.repeat(np.arange(len(cardinality), dtype=np.int32), cardinality)
     nothing = np.zeros(0, np.int64)
@@ -77,4 +85,5 @@ def _as_network(parts: Sequence[Part], first: Int64, cardinality: Int32, start: 
         Model({}, {}, ()), Evidence({}, {}, {}, {}), np.arange(n_atoms), variable,
         (np.arange(n_atoms) - start[:-1][variable]).astype(np.int32), cardinality, np.ones(len(cardinality), np.bool_),
         tuple(clauses), (), weights, nothing.astype(np.int32), nothing, nothing,
+        tuple(counts),
     )  # fmt: skip

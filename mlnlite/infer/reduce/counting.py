@@ -85,6 +85,28 @@ class Chains:
     worth: Float
     scale: Float
 
+    def true_at(self, world: Int64) -> Bool:
+        """Which literals are true; shape (n, m).
+
+        Args:
+            world: shape (n_variables,), their values.
+        """
+        return np.asarray((world[self.variable] == self.value) == self.equal)
+
+    def gains(self, world: Int64) -> Float:
+        """What each chain gains in a world; shape (n,)."""
+        worth = self.worth[self.true_at(world) @ self.steps]
+        return np.where(np.isneginf(worth), worth, self.scale * np.where(np.isneginf(worth), 0.0, worth))
+
+    def scaled(self) -> Iterator[tuple[Int64, Float]]:
+        """Rows with equal scale, and what each count is worth to them."""
+        for scale in np.unique(self.scale).tolist():
+            finite = np.isfinite(self.worth)
+            yield (
+                np.flatnonzero(self.scale == scale),
+                np.where(finite, np.where(finite, self.worth, 0) * scale, -np.inf),
+            )
+
     def pick(self, rows: Int64, order: Int64) -> Chains:
         """Some of the chains, their literals in another order."""
         at = np.ix_(rows, order)

@@ -11,10 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlnlite.ground.network import Bool, Float
+from mlnlite.ground.network import Bool, Float, Int64
 from mlnlite.infer.reduce.conjunctions import Cells, starts_of, summed
+from mlnlite.infer.reduce.counting import Chains
 from mlnlite.infer.reduce.potentials import Potentials
 from mlnlite.infer.reduce.propagate import propagate
+from mlnlite.infer.reduce.settle import settled
 
 _PASSES = 50
 _LARGE = 100_000
@@ -23,7 +25,7 @@ _BITS = 62
 
 def without_dominated(potentials: Potentials) -> Potentials:
     """Potentials with dominated values forbidden, equal cells merged."""
-    reduced = replace(potentials, cells=tuple(merged(c) for c in potentials.cells))
+    reduced = settled(replace(potentials, cells=tuple(merged(c) for c in potentials.cells)))
     for _ in range(_PASSES):
         drop = dominated(reduced)
         if not drop.any() or np.isneginf(reduced.constant):
@@ -35,7 +37,7 @@ def without_dominated(potentials: Potentials) -> Potentials:
         value = (flat - start[variable]).astype(np.int32)[:, None]
         forbidden = Cells(variable.astype(np.int32)[:, None], value, np.full(len(flat), -np.inf))
         cells, constant = propagate([*reduced.cells, forbidden], reduced.cardinality, reduced.constant)
-        reduced = replace(reduced, cells=tuple(merged(c) for c in cells), constant=constant)
+        reduced = settled(replace(reduced, cells=tuple(merged(c) for c in cells), constant=constant))
         if few:
             return reduced
     return reduced
@@ -55,7 +57,22 @@ def bounds(potentials: Potentials) -> tuple[Float, Float]:
         for column in flat.T:
             low += np.bincount(column, np.minimum(c.amount, 0.0), n)
             high += np.bincount(column, np.maximum(c.amount, 0.0), n)
+    for chains in potentials.chains:
+        _add_bounds(chains, start[chains.variable] + chains.value, low, high)
     return low, high
+
+
+def _add_bounds(chains: Chains, flat: Int64, low: Float, high: Float) -> None:
+    """Adds what a literal of a counting factor can do: a step from any count to a larger one, or back."""
+    for rows, worth in chains.scaled():
+        for i, step in enumerate(chains.steps.tolist()):
+            allowed = np.isfinite(worth[step:]) | np.isfinite(worth[:-step])
+            gain = worth[step:][allowed] - worth[:-step][allowed]
+            least, most = (float(gain.min()), float(gain.max())) if len(gain) else (0.0, 0.0)
+            for equal, down, up in ((True, least, most), (False, -most, -least)):
+                at = flat[rows[chains.equal[rows, i] == equal], i]
+                np.add.at(low, at, down if down < np.inf else 0.0)
+                np.add.at(high, at, up if up > -np.inf else 0.0)
 
 
 def dominated(potentials: Potentials) -> Bool:

@@ -58,12 +58,18 @@ def put_back_ties(ties: Ties, values: Int64) -> None:
 
 
 def _tied(potentials: Potentials) -> tuple[Int64, Int64, Bool]:
-    """Pairs of atoms of which two opposite cells are forbidden, and whether they have opposite values."""
+    """Pairs of atoms of which two opposite cells are forbidden, and whether they have opposite values.
+
+    Atoms of counting factors stay what they are.
+    """
     n = len(potentials.cardinality)
     pairs = next((c for c in potentials.cells if c.scope.shape[1] == 2), None)
     if pairs is None:
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.bool_)
-    hard = np.isneginf(pairs.amount) & (potentials.cardinality[pairs.scope] == 2).all(axis=1)
+    free = potentials.cardinality == 2
+    for chains in potentials.chains:
+        free[chains.variable] = False
+    hard = np.isneginf(pairs.amount) & free[pairs.scope].all(axis=1)
     scope, value = pairs.scope[hard].astype(np.int64), pairs.value[hard]
     key = (scope[:, 0] * n + scope[:, 1]) * 2 + (value[:, 0] == value[:, 1])
     cells = np.unique(key * 2 + value[:, 0])
@@ -83,4 +89,4 @@ def _renamed(potentials: Potentials, ties: Ties) -> Potentials:
         value = np.where(ties.opposite[c.scope], 1 - c.value, c.value).astype(np.int32)
         found, gain = cells_of(Conjunctions(variable, value, np.ones(value.shape, np.bool_), c.amount), cardinality)
         cells, constant = [*cells, *found], constant + gain
-    return Potentials(cardinality, *propagate(cells, cardinality, constant))
+    return Potentials(cardinality, *propagate(cells, cardinality, constant), potentials.chains)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from mlnlite.ground.network import Bool, Float, Int32, Int64
 from mlnlite.infer.reduce.components import labels_of, rows_by_label
 from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.counting import Chains
 from mlnlite.infer.reduce.fill import Placed, fill
 from mlnlite.infer.reduce.potentials import Potentials
 
@@ -43,12 +44,14 @@ class Part:
         variables: shape (n,), its variables, rising.
         cardinality: shape (n,).
         cells: its cells, over indices of `variables`.
+        chains: its counting factors that are not among the cells, likewise.
     """
 
     component: int
     variables: Int64
     cardinality: Int32
     cells: tuple[Cells, ...]
+    chains: tuple[Chains, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +102,8 @@ class Division:
         starts: shape (n_components + 1,), where each rank starts in `members`.
         cells: sorted by rank.
         cell_starts: for each of the cells, where each rank starts.
+        chains: sorted by rank.
+        chain_starts: for each of the chains, where each rank starts.
     """
 
     potentials: Potentials
@@ -110,6 +115,8 @@ class Division:
     starts: Int64
     cells: tuple[Cells, ...]
     cell_starts: tuple[Int64, ...]
+    chains: tuple[Chains, ...]
+    chain_starts: tuple[Int64, ...]
 
     @property
     def n_components(self) -> int:
@@ -124,10 +131,13 @@ def divide(potentials: Potentials, small: int = SMALL) -> Division:
         potentials: of a network.
         small: up to how many worlds a component counts as small.
     """
-    label = labels_of(len(potentials.cardinality), [c.scope for c in potentials.cells])
+    scopes = [*(c.scope for c in potentials.cells), *(c.variable for c in potentials.chains)]
+    label = labels_of(len(potentials.cardinality), scopes)
     n = int(label.max(initial=-1)) + 1
     bits = np.bincount(label, np.log2(potentials.cardinality), minlength=n)
     is_small = bits <= np.log2(small) + 1e-9
+    for chained in potentials.chains:
+        is_small[label[chained.variable[:, 0]]] = False
     order = np.lexsort((np.where(is_small[label], potentials.cardinality, 0), label))
     starts = np.searchsorted(label[order], np.arange(n + 1))
     shapes, shape = _shapes(potentials.cardinality[order], starts, is_small)
@@ -141,9 +151,14 @@ def divide(potentials: Potentials, small: int = SMALL) -> Division:
         rows, begin = rows_by_label(rank[label[c.scope[:, 0]]].astype(np.int32), n)
         cells.append(Cells(c.scope[rows], c.value[rows], c.amount[rows]))
         cell_starts.append(begin)
+    chains, chain_starts = [], []
+    for chained in potentials.chains:
+        rows, begin = rows_by_label(rank[label[chained.variable[:, 0]]].astype(np.int32), n)
+        chains.append(chained.pick(rows, np.arange(len(chained.steps))))
+        chain_starts.append(begin)
     return Division(
         potentials, label, rank, shapes, np.searchsorted(shape[by_rank], np.arange(len(shapes) + 1)), order[moved],
-        np.concatenate([[0], np.cumsum(lengths)]), tuple(cells), tuple(cell_starts),
+        np.concatenate([[0], np.cumsum(lengths)]), tuple(cells), tuple(cell_starts), tuple(chains), tuple(chain_starts),
     )  # fmt: skip
 
 
@@ -223,18 +238,26 @@ def parts(division: Division, take: Bool) -> Iterator[Part]:
                 for c, b in zip(division.cells, division.cell_starts, strict=True)
                 if b[r] < b[r + 1]
             )
-            yield Part(int(number[r]), variables, division.potentials.cardinality[variables], cells)
+            chains = tuple(
+                replace(own, variable=local[own.variable])
+                for c, b in zip(division.chains, division.chain_starts, strict=True)
+                if b[r] < b[r + 1]
+                for own in [c.pick(np.arange(b[r], b[r + 1]), np.arange(len(c.steps)))]
+            )
+            yield Part(int(number[r]), variables, division.potentials.cardinality[variables], cells, chains)
 
 
 def identity(part: Part) -> object:
     """Equal for components that differ in the names of their variables only (if they stand in the same order)."""
+    assert not part.chains
     arrays = [a.tobytes() for c in part.cells for a in (c.scope, c.value, c.amount)]
     return part.cardinality.tobytes(), *arrays
 
 
 def all_gains(part: Part) -> float:
     """The sum of all gains, which no world can pass."""
-    return float(sum(c.amount[c.amount > 0].sum() for c in part.cells))
+    of_chains = sum(worth.max() * len(rows) for c in part.chains for rows, worth in c.scaled())
+    return float(sum(c.amount[c.amount > 0].sum() for c in part.cells) + of_chains)
 
 
 def value_of(part: Part, world: Int64) -> float:
@@ -244,7 +267,8 @@ def value_of(part: Part, world: Int64) -> float:
         part: the component.
         world: shape (n,), a value for each variable.
     """
-    return float(sum(c.amount[holding(c, world)].sum() for c in part.cells))
+    of_chains = sum(c.gains(world).sum() for c in part.chains)
+    return float(sum(c.amount[holding(c, world)].sum() for c in part.cells) + of_chains)
 
 
 def holding(cells: Cells, world: Int64) -> Bool:

@@ -117,6 +117,8 @@ def _rounds(potentials: Potentials, names: Int64, fewest: int) -> list[_Edge]:
     for c in potentials.cells:
         if c.scope.shape[1] > 2:
             bound[c.scope.ravel()] = True
+    for chains in potentials.chains:
+        bound[chains.variable.ravel()] = True
     left = np.arange(len(names))
     rounds: list[_Edge] = []
     while True:
