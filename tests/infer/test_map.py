@@ -9,8 +9,9 @@ from benchmarks.generators import smokers
 from mlnlite.errors import Contradiction
 from mlnlite.infer.map import ladder as map_module
 from mlnlite.infer.map.ladder import map_of
+from mlnlite.infer.map.rungs import METHODS
 from mlnlite.infer.reduce import parts, peel
-from tests.networks import attracting_networks, networks, world_weight, worlds
+from tests.networks import attracting_networks, network, networks, world_weight, worlds
 
 
 def best_weight(net):
@@ -33,28 +34,60 @@ def test_best_world_equals_enumeration(net, small, fewest):
         answer = map_of(net)
     assert answer.log_weight == pytest.approx(expected, abs=1e-9)
     assert answer.log_weight == pytest.approx(world_weight(net, answer.truth), abs=1e-9)
-    assert answer.bound == pytest.approx(answer.log_weight, abs=1e-6)
+    assert answer.bound == pytest.approx(answer.log_weight, abs=1e-5)
     assert answer.status == "optimal"
 
 
-@pytest.mark.parametrize("method", ["wcsp", "ilp"])
-@settings(max_examples=25, deadline=None)
-@given(net=networks())
-def test_solvers_equal_enumeration(net, method):
+SEARCHES = ("annealing", "maxwalksat")
+
+
+@pytest.mark.parametrize("method", METHODS)
+@settings(max_examples=20, deadline=None)
+@given(net=networks(max_atoms=14))
+def test_every_rung_equals_enumeration(net, method):
+    """Minimum cuts answer what they can and refuse the rest; searches find the best worlds, but seldom prove it."""
     expected = best_weight(net)
-    if np.isneginf(expected):
-        with pytest.raises(Contradiction):
-            map_of(net, method=method)
+    try:
+        answer = map_of(net, method=method)
+    except Contradiction:
+        assert np.isneginf(expected)
         return
-    answer = map_of(net, method=method)
-    assert answer.log_weight == pytest.approx(expected, abs=1e-9)
-    assert answer.status == "optimal"
-    assert 0 <= answer.gap < 1e-5
+    except ml.QueryMistake:
+        assert method == "mincut"
+        return
+    assert answer.log_weight == pytest.approx(expected, abs=1e-6)
+    assert answer.log_weight == pytest.approx(world_weight(net, answer.truth), abs=1e-9)
+    assert answer.bound >= expected - 1e-9
+    assert answer.status == "optimal" or method in SEARCHES
+    assert answer.status == "feasible" or 0 <= answer.gap < 1e-5
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_every_rung_agrees_with_the_others_on_networks_of_a_middle_size(seed):
+    """Attractive pairs, so that minimum cuts can take part, and a frustrated network with counts for all others."""
+    rng = np.random.default_rng(seed)
+    pairs = rng.integers(0, 60, (90, 2))
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]] + 1
+    weights = [round(float(w), 2) for w in rng.exponential(1, len(pairs))] + [0.9, -0.8, -1.1]
+    clauses = [([([int(-a), int(b)], i, 1)], False) for i, (a, b) in enumerate(pairs)]
+    units = [([([int(a) * int(rng.choice([-1, 1]))], int(len(pairs) + a % 2), 1)], False) for a in range(1, 61)]
+    circles = [([int(x) + 1 for x in rng.choice(60, 8, replace=False)], len(pairs) + 2, 1) for _ in range(6)]
+    attractive = network([("", 1)] * 60, clauses + units, (), weights)
+    frustrated = network([("", 1)] * 60, clauses + units, (), weights, counts=[(np.arange(9) ** 2 % 5, circles)])
+    for net, methods in ((attractive, METHODS), (frustrated, [m for m in METHODS if m != "mincut"])):
+        answers = {m: map_of(net, method=m, time_limit=30) for m in methods}
+        best, bound = max(a.log_weight for a in answers.values()), min(a.bound for a in answers.values())
+        assert best <= bound + 1e-5
+        for name, answer in answers.items():
+            assert best <= answer.bound + 1e-5, name
+            assert answer.log_weight >= best - answer.gap - 1e-5, name
+            assert answer.status == "feasible" or answer.log_weight == pytest.approx(best, abs=1e-5), name
+        assert answers["annealing"].log_weight == pytest.approx(best, abs=1e-5)
 
 
 @pytest.mark.parametrize("at_once", [0, 10**9])
 @pytest.mark.parametrize("method", ["auto", "mincut"])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(net=attracting_networks())
 def test_minimum_cuts_equal_enumeration(net, method, at_once):
     expected = best_weight(net)

@@ -1,5 +1,7 @@
 """Every rung against listing all worlds, and against each other where listing is too much."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,12 +16,13 @@ from mlnlite.infer.map.flow_kernel import arcs, greedy, push, seeds
 from mlnlite.infer.map.ladder import map_of
 from mlnlite.infer.map.search import annealing, walksat
 from mlnlite.infer.map.search.annealing_kernel import sweeps
-from mlnlite.infer.map.search.landscape import landscape_of, missing_of, worth
+from mlnlite.infer.map.search.landscape import holding, landscape_of, missing_of, worth
 from mlnlite.infer.map.search.walksat_kernel import walk
 from mlnlite.infer.map.twins import twins_of
 from mlnlite.infer.reduce.conjunctions import Cells
+from mlnlite.infer.reduce.counting import Chains
 from mlnlite.infer.reduce.dominance import merged, without_dominated
-from mlnlite.infer.reduce.narrow import narrowed
+from mlnlite.infer.reduce.narrow import narrowed, written
 from mlnlite.infer.reduce.parts import Part, all_gains, value_of
 from mlnlite.infer.reduce.potentials import Potentials, potentials_of
 from mlnlite.infer.workers.ask import workers
@@ -32,10 +35,10 @@ def ask():
         yield ask
 
 
-def whole(net):
+def whole(net, *, chained=True):
     """A network as one component, without any simplification but unit propagation."""
-    p = potentials_of(net, max_arity=np.inf)
-    return p, Part(0, np.arange(len(p.cardinality)), p.cardinality, p.cells)
+    p = potentials_of(net, max_arity=np.inf, chained=chained)
+    return p, Part(0, np.arange(len(p.cardinality)), p.cardinality, p.cells, p.chains)
 
 
 def best_weight(net):
@@ -43,7 +46,10 @@ def best_weight(net):
 
 
 def by_elimination(part, _):
-    small = narrowed(part)
+    small, constant = written(part)
+    if np.isneginf(constant):
+        return None
+    small = narrowed(small)
     tree = plan(small.cardinality, [c.scope for c in small.cells], 1 << 20)
     value, world = best_world(tree, small.cardinality, small.cells)
     return None if np.isneginf(value) else world[: len(part.variables)]
@@ -90,11 +96,11 @@ def test_elimination_with_wide_cells_equals_enumeration(net):
 
 
 @settings(max_examples=100, deadline=None)
-@given(net=networks(max_atoms=12, with_counts=False))
+@given(net=networks(max_atoms=12))
 def test_dominance_keeps_a_best_world(net):
     expected = best_weight(net)
-    reduced = without_dominated(potentials_of(net, max_arity=np.inf))
-    part = Part(0, np.arange(net.n_variables), reduced.cardinality, reduced.cells)
+    reduced = without_dominated(potentials_of(net, max_arity=np.inf, chained=True))
+    part = Part(0, np.arange(net.n_variables), reduced.cardinality, reduced.cells, reduced.chains)
     values = [(truth @ np.diag(net.value)).astype(int) for truth in worlds(net)]
     of_variables = [np.bincount(net.variable, v, net.n_variables).astype(np.int64) for v in values]
     if np.isneginf(expected):
@@ -105,7 +111,7 @@ def test_dominance_keeps_a_best_world(net):
 
 @pytest.mark.parametrize("search", [annealing.solve_part, walksat.solve_part])
 @settings(max_examples=40, deadline=None)
-@given(net=networks(max_atoms=14, with_counts=False))
+@given(net=networks(max_atoms=14))
 def test_searches_find_best_worlds_of_small_networks(search, net):
     expected = best_weight(net)
     potentials, part = whole(net)
@@ -135,6 +141,59 @@ def test_linear_bounds_hold_with_any_multipliers(net, solver, seed):
     program, _ = ilp.program_of(part)
     anything = np.random.default_rng(seed).normal(0, 1, program.n_rows)
     assert potentials.constant + relaxation.bound_of(part, program, anything)[0] >= expected - 1e-9
+
+
+def counted(worth_, steps=None, gains=None):
+    """A component of atoms of which a count is worth something, and each atom something by itself."""
+    steps = np.ones(len(worth_) - 1, np.int32) if steps is None else np.array(steps, np.int32)
+    m = len(steps)
+    chains = Chains(
+        np.arange(m)[None].astype(np.int32), np.ones((1, m), np.int32), np.ones((1, m), bool), steps, worth_, np.ones(1)
+    )
+    own = Cells(np.arange(m, dtype=np.int32)[:, None], np.ones((m, 1), np.int32), np.array(gains))
+    return Part(0, np.arange(m), np.full(m, 2, np.int32), (own,), (chains,))
+
+
+def test_convex_costs_of_a_count_need_no_binary_columns():
+    gains = np.round(np.random.default_rng(0).normal(0.5, 1, 40), 2)
+    part = counted(-0.05 * np.arange(41.0) ** 2, gains=gains)
+    program, columns = ilp.program_of(part)
+    assert program.binary == []
+    assert program.n_rows == 2
+    assert program.n_columns == columns.n + 40
+    best = max(np.sort(gains)[::-1][:k].sum() - 0.05 * k**2 for k in range(41))
+    for answer in (relaxation.solve_part(part, solver_name="simplex"), ilp.solve_part(part)):
+        assert answer.optimal
+        assert value_of(part, answer.world) == pytest.approx(best)
+        assert answer.bound == pytest.approx(best, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("worth_", "n_binary"),
+    [
+        ([0, 0, 0, 5.0, 5, 5], 1),  # flat, up, flat: the second bend is the wrong way
+        ([0, 1, 2, 3, 4, 5.0], 0),
+        ([0, -np.inf, -np.inf, 2, 3, 4], 2),  # all or at least three
+        ([-np.inf, -np.inf, 1, 1, -np.inf, -np.inf], 0),
+        ([3.0, 0, 3, 0, 3, 0], 2),
+    ],
+)
+def test_binary_columns_stand_where_costs_of_a_count_are_not_convex(worth_, n_binary):
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        part = counted(np.array(worth_), gains=np.round(rng.normal(0, 2, 5), 2))
+        assert len(ilp.program_of(part)[0].binary) == n_binary
+        best = max(value_of(part, np.array([w >> i & 1 for i in range(5)])) for w in range(32))
+        answer = ilp.solve_part(part)
+        assert value_of(part, answer.world) == pytest.approx(best)
+        assert answer.bound == pytest.approx(best, abs=1e-5)
+
+
+def test_counts_that_no_atoms_add_up_to_are_no_bends():
+    part = counted(np.array([0, 9, 2, 9, 4, 9, 6]), steps=[2, 2, 2], gains=[-1.0, 1, 1])
+    assert ilp.program_of(part)[0].binary == []
+    assert value_of(part, ilp.solve_part(part).world) == pytest.approx(7.0)
+    assert ilp.solve_part(counted(np.full(4, -np.inf), gains=[1.0, 1, 1])).world is None
 
 
 def test_pairs_that_stand_several_times_are_not_all_pairs():
@@ -258,22 +317,37 @@ def test_hard_formulas_that_exclude_each_other_are_found_out(method):
 # --- compiled kernels and their plain twins
 
 
+def with_counts(part):
+    """The component with a counting factor over values of blocks that are to be and are not to be."""
+    n, rng = len(part.variables), np.random.default_rng(5)
+    variable, value = (
+        np.array([np.arange(n), np.arange(n)[::-1]], np.int32),
+        rng.integers(0, 2, (2, n)).astype(np.int32),
+    )
+    steps = np.sort(rng.integers(1, 3, n)).astype(np.int32)
+    worth_ = np.round(rng.normal(0, 2, steps.sum() + 1), 2)
+    chains = Chains(variable, value, rng.random((2, n)) < 0.5, steps, worth_, np.array([1.0, -0.5]))
+    return replace(part, chains=(chains,))
+
+
 def test_kernels_do_what_their_python_does():
     rng = np.random.default_rng(0)
-    part = whole(one_hot(3, n=8))[1]
+    part = with_counts(whole(one_hot(3, n=8))[1])
     landscape = landscape_of(part)
-    runs = []
+    tallies, runs = landscape.tallies, []
     for kernel in (sweeps, sweeps.py_func):
         world = np.zeros(8, np.int64)
         best, missing, chance = world.copy(), missing_of(landscape, world), np.random.default_rng(4)
-        value = worth(landscape, world)
+        value, state = worth(landscape, world), tallies.states(holding(landscape, world))
         value, top = kernel(
-            landscape.start, landscape.begin, landscape.cell, landscape.amount, missing, world, best,
-            np.geomspace(3, 0.1, 50), value, value, chance,
+            landscape.start, landscape.begin, landscape.cell, landscape.amount, tallies.arrays, missing, state,
+            world, best, np.geomspace(3, 0.1, 50), value, value, chance,
         )  # fmt: skip
         assert worth(landscape, world) == pytest.approx(value)
         assert worth(landscape, best) == pytest.approx(top)
         assert (missing == missing_of(landscape, world)).all()
+        assert (state == tallies.states(holding(landscape, world))).all()
+        assert value_of(part, best) == pytest.approx(top)
         runs.append((world.tolist(), top))
     assert runs[0] == runs[1]
     function = mincut.quadratic(attractive(rng, 30, 60))
@@ -281,7 +355,7 @@ def test_kernels_do_what_their_python_does():
 
 
 def test_walks_do_what_their_python_does(monkeypatch):
-    part = whole(one_hot(3, n=8))[1]
+    part = with_counts(whole(one_hot(3, n=8))[1])
     compiled = walksat.solve_part(part, seed=2, steps=900)
     monkeypatch.setattr("mlnlite.infer.map.search.walksat_kernel.walk", walk.py_func)
     plain = walksat.solve_part(part, seed=2, steps=900)
@@ -319,7 +393,7 @@ def renamed(part, rng):
 
 
 @settings(max_examples=40, deadline=None)
-@given(net=networks(with_counts=False), other=networks(with_counts=False), seed=st.integers(0, 99))
+@given(net=networks(with_counts=False), other=networks(), seed=st.integers(0, 99))
 def test_copies_have_the_worlds_of_their_originals(net, other, seed):
     rng = np.random.default_rng(seed)
     part, different = whole(net)[1], whole(other)[1]

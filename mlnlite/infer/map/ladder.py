@@ -32,7 +32,7 @@ SAT = "satisfiability"
 _CHEAP = 1 << 18
 _CHEAP_IN_ALL = 1 << 20
 _DENSE, _SPARSE, _MANY = 16, 5, 2000
-_AT_ONCE = 100_000
+_AT_ONCE, _FEW_CELLS = 100_000, 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +217,7 @@ def _eliminate(part: Part, method: Method, width_limit: int, search: _Search) ->
     if method == "auto":
         largest, total = min(width_limit, _CHEAP), _CHEAP_IN_ALL
         n_cells = sum(len(c.amount) for c in part.cells if c.scope.shape[1] > 1)
-        if n_cells > (_DENSE if n < _MANY else _SPARSE) * len(part.cardinality):
+        if n_cells > max(_FEW_CELLS, (_DENSE if n < _MANY else _SPARSE) * len(part.cardinality)):
             return False
     part = narrowed(part)
     tree = plan(part.cardinality, [c.scope for c in part.cells], largest, total)

@@ -54,6 +54,7 @@ def _problem(part: Part) -> tuple[dict[str, Any], float, float]:
     amounts = np.concatenate([np.zeros(0), *(c.amount[np.isfinite(c.amount)] for c in part.cells)])
     room = np.floor(np.log10(_LARGEST / max(1.0, float(np.abs(amounts).sum()))))
     scale = 10.0 ** min(_FINEST, int(room))
+    error = float(np.abs(np.rint(amounts * scale) / scale - amounts).sum())
     hard: list[list[int]] = []
     for begin, size in zip(first.tolist(), part.cardinality.tolist(), strict=True):
         values = list(range(begin, begin + size))
@@ -74,4 +75,4 @@ def _problem(part: Part) -> tuple[dict[str, Any], float, float]:
                 hard += [[-auxiliary, x] for x in literals]
                 soft.append([auxiliary])
                 weights.append(weight)
-    return {"hard": hard, "soft": soft, "weights": weights}, scale, len(amounts) / scale
+    return {"hard": hard, "soft": soft, "weights": weights}, scale, error

@@ -70,7 +70,7 @@ def _problem(part: Part) -> tuple[dict[str, object], float, float]:
         for begin, end in pairwise(starts):
             functions.append([scopes[begin], 0, values[begin:end], costs[begin:end]])
     problem: dict[str, object] = {"cardinality": part.cardinality.tolist(), "functions": functions}
-    return problem, scale, 0.5 * len(amounts) / scale
+    return problem, scale, float(np.abs(np.rint(amounts * scale) / scale - amounts).sum())
 
 
 def _costs(amount: Float, scale: float) -> list[int | None]:

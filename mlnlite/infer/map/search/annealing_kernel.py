@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.compiled import compiled
-from mlnlite.infer.map.search.moves_kernel import gain_of, shift
+from mlnlite.infer.map.search.moves_kernel import count, gain_of, shift
 
 
 @compiled
-def sweeps(start, begin, cell, amount, missing, world, best, temperatures, value, top, rng):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, PLR0913
+def sweeps(start, begin, cell, amount, counts, missing, state, world, best, temperatures, value, top, rng):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, PLR0913
     """As many moves as there are variables at each temperature; returns the value of `world` and that of `best`.
 
     Args:
@@ -17,7 +17,9 @@ def sweeps(start, begin, cell, amount, missing, world, best, temperatures, value
         begin: see there.
         cell: see there.
         amount: see there.
+        counts: see `Tallies.arrays`.
         missing: shape (n_cells,), literals of each cell that do not hold; kept up to date.
+        state: shape (n_counting_factors,), likewise.
         world: shape (n,), changed in place.
         best: shape (n,), the best world so far.
         temperatures: shape (n_sweeps,).
@@ -35,10 +37,12 @@ def sweeps(start, begin, cell, amount, missing, world, best, temperatures, value
             old = world[v]
             new = int(rng.random() * (size - 1))
             new += new >= old
-            gain = gain_of(begin, cell, amount, missing, start[v] + old, start[v] + new)
+            gone, come = start[v] + old, start[v] + new
+            gain = gain_of(begin, cell, amount, missing, gone, come) + count(counts, state, gone, come)
             if gain < 0 and rng.random() >= np.exp(gain / temperature):
+                count(counts, state, come, gone)
                 continue
-            shift(begin, cell, missing, start[v] + old, start[v] + new)
+            shift(begin, cell, missing, gone, come)
             world[v] = new
             value += gain
         if value > top:

@@ -9,8 +9,8 @@ import numpy as np
 
 from mlnlite.ground.network import Int64
 from mlnlite.infer.deadline import FOREVER, Deadline
-from mlnlite.infer.map.search.landscape import Landscape, landscape_of, missing_of, worth
-from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains
+from mlnlite.infer.map.search.landscape import Landscape, holding, landscape_of, missing_of, worth
+from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains, value_of
 
 MAXWALKSAT = "maxwalksat"
 _NOISE, _TABU, _CHUNK = 0.1, 5, 100_000
@@ -38,8 +38,8 @@ def solve_part(
             best, top = found, value
         if deadline.is_over:
             break
-    forbidden = bool((missing_of(landscape, best)[landscape.hard] == 0).any())
-    return PartAnswer(None if forbidden else best, all_gains(part), False, MAXWALKSAT)
+    possible = np.isfinite(value_of(part, best))
+    return PartAnswer(best if possible else None, all_gains(part), False, MAXWALKSAT)
 
 
 def _from(
@@ -48,18 +48,21 @@ def _from(
     """Walks from a world; returns the best one seen and its value."""
     from mlnlite.infer.map.search.walksat_kernel import walk
 
-    missing = missing_of(landscape, world)
-    costs = np.flatnonzero((missing == 0) == (landscape.amount < 0))
-    unpaid, place = np.zeros(len(missing), np.int64), np.full(len(missing), -1, np.int64)
+    tallies, holds, missing = landscape.tallies, holding(landscape, world), missing_of(landscape, world)
+    pays = np.concatenate([(missing == 0) != (landscape.amount < 0), tallies.gains(holds) >= tallies.most])
+    costs = np.flatnonzero(~pays)
+    unpaid, place = np.zeros(len(pays), np.int64), np.full(len(pays), -1, np.int64)
     unpaid[: len(costs)], place[costs] = costs, np.arange(len(costs))
     owner = np.repeat(np.arange(len(world)), np.diff(landscape.start))
     best, last, n_unpaid = world.copy(), np.full(len(world), -_TABU - 1, np.int64), len(costs)
-    value = top = worth(landscape, world)
+    value, top, state = worth(landscape, world), worth(landscape, world), tallies.states(holds)
+    first = np.concatenate([landscape.first, landscape.first[-1] + tallies.first[1:]])
+    literal = np.concatenate([landscape.literal, tallies.mover])
     for now in range(0, steps, _CHUNK):
         n_unpaid, value, top = walk(
-            landscape.start, landscape.begin, landscape.cell, landscape.first, landscape.literal, landscape.amount,
-            owner, missing, world, best, unpaid, place, last, n_unpaid, min(_CHUNK, steps - now), _NOISE, _TABU, now,
-            value, top, rng,
+            landscape.start, landscape.begin, landscape.cell, first, literal, landscape.amount, tallies.arrays,
+            owner, missing, state, world, best, unpaid, place, last, n_unpaid, min(_CHUNK, steps - now), _NOISE, _TABU,
+            now, value, top, rng,
         )  # fmt: skip
         if deadline.is_over or not n_unpaid:
             break

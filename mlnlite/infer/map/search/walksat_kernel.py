@@ -5,30 +5,33 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.compiled import compiled
-from mlnlite.infer.map.search.moves_kernel import enlist, gain_of, shift
+from mlnlite.infer.map.search.moves_kernel import count, enlist, enlist_counts, gain_of, shift
 
 
 @compiled
-def walk(start, begin, cell, first, literal, amount, owner, missing, world, best, unpaid, place, last, n_unpaid, steps, noise, tabu, now, value, top, rng):  # type: ignore[no-untyped-def]  # fmt: skip  # noqa: ANN001, ANN201, E501, PLR0913
-    """Steps: take a cell that costs, at random, and change one of its variables so that it does not.
+def walk(start, begin, cell, first, literal, amount, counts, owner, missing, state, world, best, unpaid, place, last, n_unpaid, steps, noise, tabu, now, value, top, rng):  # type: ignore[no-untyped-def]  # fmt: skip  # noqa: ANN001, ANN201, E501, PLR0913
+    """Steps: take what costs, at random, and change one of its variables so that it does not.
 
-    A cell costs if it holds and its amount is negative, or fails to hold and its amount is positive.
+    A cell costs if it holds and its amount is negative, or fails to hold and its amount is positive; a counting factor
+    if another count is worth more. Counting factors are numbered after the cells.
 
     Args:
-        start: as in `Landscape`; likewise `begin`, `cell`, `first`, `literal`, `amount`.
+        start: as in `Landscape`; likewise `begin`, `cell`, `amount`.
         begin: see there.
         cell: see there.
-        first: see there.
-        literal: see there.
+        first: shape (n + 1,), where the literals of each cell and counting factor start.
+        literal: the values that they need, or that move their count.
         amount: see there.
+        counts: see `Tallies.arrays`.
         owner: shape (total cardinality,), the variable of each value.
-        missing: shape (n_cells,), literals of each cell that do not hold; kept up to date, like the next four.
+        missing: shape (n_cells,), literals of each cell that do not hold; kept up to date, like the next five.
+        state: shape (n_counting_factors,).
         world: shape (n,).
         best: shape (n,), the best world so far.
-        unpaid: shape (n_cells,), the cells that cost, `n_unpaid` of them.
-        place: shape (n_cells,), where each of them stands, -1 for the others.
+        unpaid: shape (n,), what costs, `n_unpaid` of them.
+        place: shape (n,), where each of them stands, -1 for the others.
         last: shape (n,), the step in which each variable was changed last.
-        n_unpaid: how many cells cost.
+        n_unpaid: how many cost.
         steps: how many to take.
         noise: how often to change any variable instead of the best one.
         tabu: for how many steps a variable rests.
@@ -40,6 +43,7 @@ def walk(start, begin, cell, first, literal, amount, owner, missing, world, best
     Returns:
         `n_unpaid`, `value`, `top` after the steps.
     """
+    n_cells = len(amount)
     for step in range(now, now + steps):
         if n_unpaid == 0:
             break
@@ -54,12 +58,14 @@ def walk(start, begin, cell, first, literal, amount, owner, missing, world, best
             flat = literal[first[c] + k]
             v = owner[flat]
             own, size = flat - start[v], start[v + 1] - start[v]
-            if (world[v] == own) == (amount[c] > 0):
+            if c < n_cells and (world[v] == own) == (amount[c] > 0):
                 continue
             for new in range(size):
-                if new == world[v] or (amount[c] > 0 and new != own):
+                if new == world[v] or (world[v] != own and new != own):
                     continue
-                gain = gain_of(begin, cell, amount, missing, start[v] + world[v], start[v] + new)
+                gone, come = start[v] + world[v], start[v] + new
+                gain = gain_of(begin, cell, amount, missing, gone, come) + count(counts, state, gone, come)
+                count(counts, state, come, gone)
                 rests = step - last[v] <= tabu and value + gain <= top
                 if gain > move_gain and not rests:
                     move_v, move_new, move_gain = v, new, gain
@@ -67,8 +73,10 @@ def walk(start, begin, cell, first, literal, amount, owner, missing, world, best
             continue
         gone, come = start[move_v] + world[move_v], start[move_v] + move_new
         shift(begin, cell, missing, gone, come)
+        count(counts, state, gone, come)
         for changed in (come, gone):
             n_unpaid = enlist(begin, cell, amount, missing, unpaid, place, n_unpaid, changed)
+            n_unpaid = enlist_counts(counts, state, n_cells, unpaid, place, n_unpaid, changed)
         world[move_v], last[move_v] = move_new, step
         value += move_gain
         if value > top + 1e-9:
