@@ -175,6 +175,8 @@ def _ascend(search: _Search) -> None:
     if x is None:
         return
     reduced = _prove(search, multipliers)
+    if _is_done(search):
+        return
     bound, n = search.found.bound, base.columns.n
     may = np.where((reduced < 0) | (x > _VIOLATED), 0.5, 0.0)
     clauses = near_violations(search.lazy, base.reading, may[:n], search.engine)
