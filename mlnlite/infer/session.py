@@ -129,14 +129,13 @@ class Session:
         model = replace(self.network.model, types=self.evidence.types, templates=())
         checked = check_evidence([parse_evidence(Source("<facts>", facts))], model)
         _verify_constants(self.evidence, checked)
-        if checked.soft:
-            raise EvidenceMistake(
-                [Diagnostic("E317", "the facts of a session are certain; soft ones stand in its evidence")]
-            )
+        if checked.soft or checked.n_databases != 1:
+            message = "the facts of a session are certain, and about one world; soft ones stand in its evidence"
+            raise EvidenceMistake([Diagnostic("E317", message)])
         found = [
             (self.evidence.atom_number(name, table.arguments), table.truth)
             for name, table in checked.facts.items()
-            if len(table.truth)
+            if len(table.truth) and self.evidence.predicates[name].comparison is None  # these follow from constants
         ]
         if not found:
             return np.empty(0, np.int64), np.empty(0, np.bool_)

@@ -159,6 +159,7 @@ def test_facts_that_last_and_facts_of_a_question():
         (lambda s: s.updated(add="!Smokes(Ann)"), "Smokes.Ann. is the opposite of a fact: withdraw that"),
         (lambda s: s.updated(add="Smokes(Dan)"), "Dan is not a constant of the type p in this session"),
         (lambda s: s.updated(add="0.7 Smokes(Bob)"), "the facts of a session are certain"),
+        (lambda s: s.updated(add="Smokes(Bob)\n---\nSmokes(Cy)"), "about one world"),
         (lambda s: s.query("Friends(Bob, Cy)"), "Friends.Bob, Cy. is known otherwise in this session"),
         (lambda s: s.query("!Smokes(Ann)"), "Smokes.Ann. is known otherwise in this session"),
     ],
@@ -187,3 +188,16 @@ def test_contradictions_name_the_formula_and_change_nothing():
     with pytest.raises(ml.Contradiction, match="true and false"):
         session.updated(add="F(Ann, C2)")
     assert session.updated(add="S(Bob)").query()["C(Bob)"] == 1.0
+
+
+def test_comparisons_and_atoms_of_no_formula_stay_what_they_are():
+    text = "Rain\nWet(p)\nAge(p, n)\nSpare(p)\np = {A, B}\nn = {1, 2, 3}\n"
+    model = ml.model_from_text(text + "1.5 Rain => Wet(x)\n0.7 Age(x, a) ^ a < 3 => Wet(x)\n0 Spare(x)\n")
+
+    def compiled(facts):
+        return ml.compile(model, query="Wet", evidence=ml.evidence_from_text(facts, model=model))
+
+    session = compiled("!Rain\nAge(A, 1)").updated(withdraw="!Rain", add=[("Rain",), ("Spare", "B")])
+    assert session.query().probabilities == pytest.approx(compiled("Rain\nAge(A, 1)").query().probabilities, abs=1e-9)
+    session = session.updated(withdraw="Age(A, 1)\nSpare(B)", add="Wet(A)").updated(withdraw="Wet(A)\nRain")
+    assert session.query().probabilities == pytest.approx(compiled("").query().probabilities, abs=1e-9)
