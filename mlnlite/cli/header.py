@@ -61,6 +61,5 @@ def _hash(path: Path) -> str:
     digest = hashlib.sha256()
     for file in files:
         with open(file.partition("::")[0], "rb") as content:
-            while block := content.read(1 << 20):
-                digest.update(block)
+            hashlib.file_digest(content, lambda: digest)
     return digest.hexdigest()
