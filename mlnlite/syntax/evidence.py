@@ -110,7 +110,7 @@ def _read_lines(file: File, start: int, end: int, reading: _Reading) -> None:
         if value and sign:
             continue
         begin = match.start(1) if sign else match.start(2) if value else match.start(3)
-        if begin - done > 1 and not text[done:begin].isspace():
+        if begin - done > 1:
             _read_between(file, done, begin, reading)
             if len(reading.mistakes) > MAX_MISTAKES:
                 return
@@ -127,6 +127,8 @@ def _read_lines(file: File, start: int, end: int, reading: _Reading) -> None:
 
 
 def _read_between(file: File, start: int, end: int, reading: _Reading) -> None:
+    if not file.code.text[start:end].strip():
+        return
     for first, last in split_facts(file.code, start, end):
         if len(reading.mistakes) >= MAX_MISTAKES:
             reading.mistakes.append(mistake("E199", Span(file.code.source, first, last), limit=MAX_MISTAKES))
