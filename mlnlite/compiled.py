@@ -9,7 +9,12 @@ from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from time import monotonic
 from typing import Any
+
+_FIRST = "compiling fast code for the first time; this is kept for later"
+_EVERY = 2.0
+"""[s] between words about it."""
 
 
 def prepare_cache() -> None:
@@ -50,19 +55,20 @@ def compiled_part(function: Callable[..., Any]) -> Any:  # noqa: ANN401
 
 @cache
 def _announce_compiling() -> None:
-    """Says once what takes so long, through the logger `mlnlite`, which by default writes to standard error."""
+    """Says what takes so long, through the logger `mlnlite`, which by default writes to standard error."""
     numba_events: Any = import_module("numba.core.event")
 
     class Announcer(numba_events.Listener):  # type: ignore[misc]
         """Hears when Numba begins to compile something that its cache does not hold."""
 
         def on_start(self, event: object) -> None:
-            """Says so, the first time."""
-            if say:
-                logging.getLogger("mlnlite").warning(say.pop())
+            """Says so, the first time, and then every two seconds."""
+            if monotonic() >= due[0]:
+                logging.getLogger("mlnlite").warning("compiling more of it" if due[0] else _FIRST)
+                due[0] = monotonic() + _EVERY
 
         def on_end(self, event: object) -> None:
             """Nothing to say."""
 
-    say = ["compiling fast code for the first time; this is kept for later"]
+    due = [0.0]
     numba_events.register("numba:compile", Announcer())

@@ -11,6 +11,7 @@ from mlnlite.ground.patterns import with_counts
 from mlnlite.infer.exact.marginal import marginals_of
 from mlnlite.infer.sample.factors import factors_of
 from mlnlite.infer.sample.gibbs import gibbs_draws, log_weights, owners, start, states
+from mlnlite.infer.sample.mcsat import chain as chain_module
 from mlnlite.infer.sample.mcsat.chain import jump, mcsat_draws
 from mlnlite.infer.sample.sampling import Effort, sample
 from mlnlite.infer.sample.worlds import start_worlds
@@ -72,13 +73,24 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize("name", ["nearly hard", "two modes"])
+def test_errors_of_trips_are_as_large_as_they_say(name, monkeypatch):
+    """MC-SAT with no slice small enough to list its worlds; 360 to 400 errors."""
+    for number, value in {"LISTED": -(1 << 40), "TRIPS": 4, "LONGEST": 16}.items():
+        monkeypatch.setattr(chain_module, number, value)
+    verify_calibrated(CASES[name][0](), "mcsat", seeds=(1,))
+
+
 @pytest.mark.parametrize(("name", "sampler"), [(n, s) for n, (_, samplers) in CASES.items() for s in samplers])
 def test_errors_are_as_large_as_they_say(name, sampler):
     """Many atoms, because those of a chain or triple are off together: 300 to 500 errors that are independent."""
-    net = CASES[name][0]()
+    verify_calibrated(CASES[name][0](), sampler)
+
+
+def verify_calibrated(net, sampler, seeds=(1, 2, 3, 4)):
     exact = marginals_of(net).probability
     scores = []
-    for seed in (1, 2, 3, 4):
+    for seed in seeds:
         found = sample(net, *everything(net), sampler, Effort(0.02, 300.0, seed=seed))
         assert found.ending == "precise"
         sure = found.exact | (found.error == 0)
@@ -194,7 +206,42 @@ def test_a_large_slice_says_that_it_was_walked():
     rows = [(sorted(int(x) for x in rng.choice(np.arange(1, n + 1), 3, replace=False)), 0, 1) for _ in range(90)]
     net = network([("", 1)] * n, [(rows, False)], weights=[np.inf])
     found = sample(net, *everything(net), "mcsat", Effort(0.02, 10.0))
-    assert "MC-SAT, partly Metropolis" in found.methods
+    assert "MC-SAT, partly SampleSAT" in found.methods
+
+
+def wide_slices():
+    """Parts with few worlds among many: two that differ everywhere; random clauses; blocks and a count."""
+    rng = np.random.default_rng(4)
+    equal = np.zeros((2, 2), bool)
+    equal[0, 0] = equal[1, 1] = True
+    rings = network([("", 1)] * 5, tables=[(equal, [([a, (a + 1) % 5], 0, 1) for a in range(5)])], weights=[np.inf])
+    rows = [([int(a) * int(rng.choice([-1, 1])) for a in rng.choice(9, 3, replace=False) + 1], 0, 1) for _ in range(22)]
+    clauses = network([("", 1)] * 9, [(rows, False)], weights=[np.inf])
+    some = ([0, 0, 1, 1, 0, 0], [([1, -2, 3, 4, 7], 0, 1)])
+    ties = [([-1, 5], 0, 1), ([-3, -6], 0, 1), ([2, -8], 0, 1), ([3, 9], 0, 1)]
+    mixed = network([("", 1)] * 3 + [("!", 3), ("?", 3)], [(ties, False)], counts=[some], weights=[np.inf])
+    return {"two far apart": rings, "random clauses": clauses, "blocks and counts": mixed}
+
+
+@pytest.mark.parametrize("name", ["two far apart", "random clauses", "blocks and counts"])
+def test_trips_keep_the_uniform_distribution(name, monkeypatch):
+    net = wide_slices()[name]
+    monkeypatch.setattr(chain_module, "LISTED", -(1 << 40))
+    monkeypatch.setattr(chain_module, "TRIPS", 8)
+    possible = [tuple(w) for w in worlds(net) if world_weight(net, w) == 0.0]
+    assert 1 < len(possible) < 60
+    factors = factors_of(net, np.ones(net.n_variables, bool))
+    even, n, seen = np.ones(net.n_variables, bool), 6000, dict.fromkeys(possible, 0)
+    chain = start(factors, np.array(possible[0])[factors.atom], np.random.default_rng(3))
+    for _ in range(n):
+        jump(chain, even)
+        truth = np.zeros(net.n_atoms, bool)
+        truth[factors.atom[chain.true[chain.true >= 0]]] = True
+        seen[tuple(truth)] += 1
+    assert not even.all()
+    frequency = np.array(list(seen.values())) / n
+    p = 1 / len(possible)
+    assert np.abs(frequency - p).max() < 5 * np.sqrt(p * (1 - p) / (n / 3))  # three draws are worth an independent one
 
 
 def test_atoms_of_a_factor_know_their_variable():
@@ -253,7 +300,9 @@ EVEN = np.ones(1000, bool)
 KERNELS = [
     ("gibbs_kernel", "sweep"), ("swap_kernel", "swap"), ("mcsat.slice", "cut"), ("mcsat.units", "propagate"),
     ("mcsat.fix", "fix"), ("mcsat.assign", "assign"), ("mcsat.list", "list_worlds"), ("mcsat.reach", "reach"),
-    ("mcsat.draw", "draw"), ("mcsat.walk", "walk"),
+    ("mcsat.draw", "draw"), ("mcsat.wander", "wander"), ("mcsat.turn", "turn"), ("mcsat.turn", "value_of"),
+    ("mcsat.turn", "pull_of"), ("mcsat.wander", "_shares"), ("mcsat.wander", "_near"), ("mcsat.wander", "_n_open"),
+    ("mcsat.wander", "_chance"),
 ]  # fmt: skip
 
 

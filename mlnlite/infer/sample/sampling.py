@@ -191,5 +191,5 @@ def _method(sampler: Sampler, exact: bool, moved: bool, uneven: bool) -> str:
     """How one estimate was found."""
     if exact:
         return "forced by hard formulas"
-    said = (["partly Metropolis"] if uneven else []) + ([] if moved else ["never seen otherwise"])
+    said = (["partly SampleSAT"] if uneven else []) + ([] if moved else ["never seen otherwise"])
     return ", ".join([_NAMES[sampler], *said])

@@ -28,12 +28,10 @@ def assign(f: Factors, s: Slice, variable: int, atom: int, sign: int) -> bool:
         if s.fixed[a] >= 0:
             continue
         for u in range(f.use[a], f.use[a + 1]):
-            i = f.factor[u]
-            s.left[i] -= sign * abs(f.step[u])
-            if not f.counted[i]:
-                s.part[i] += sign * f.step[u] * (a == atom)
-            else:
-                s.part[i] += sign * abs(f.step[u]) * ((f.step[u] > 0) == (a == atom))
+            i, step = f.factor[u], f.step[u]
+            true = step if a == atom else 0
+            s.part[i] += sign * (true - step if step < 0 and f.counted[i] else true)
+            s.left[i] -= sign * abs(step)
     if sign < 0:
         return fits
     for a in range(f.first[variable], f.first[variable + 1]):

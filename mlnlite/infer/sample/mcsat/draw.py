@@ -5,21 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.compiled import compiled
-from mlnlite.ground.network import Bool, Float, Int32
+from mlnlite.ground.network import Float, Int32, Int64
 from mlnlite.infer.sample.factors import Factors
 from mlnlite.infer.sample.mcsat.list import list_worlds
 from mlnlite.infer.sample.mcsat.reach import reach
 from mlnlite.infer.sample.mcsat.slice import Slice
-from mlnlite.infer.sample.mcsat.walk import walk
 
 
 @compiled
-def draw(f: Factors, s: Slice, owner: Int32, uniform: Float, true: Int32, exact: Bool) -> None:
-    """Draws all variables that a slice leaves open.
+def draw(f: Factors, s: Slice, owner: Int32, uniform: Float, true: Int32, steps: int) -> Int64:
+    """Draws all variables that a slice leaves open, but for parts with too many worlds.
 
-    The worlds of a part are listed twice: to count them, and to go to the one that a random number chose. In a part
-    that has too many for that the variables get new values one at a time (`walk`). Which way is taken depends on the
-    slice alone, so both leave the uniform distribution over it as it is.
+    The worlds of a part are listed twice: to count them, and to go to the one that a random number chose. Which parts
+    have too many depends on the slice alone, so all others are drawn uniformly.
 
     Args:
         f: the factors.
@@ -27,10 +25,14 @@ def draw(f: Factors, s: Slice, owner: Int32, uniform: Float, true: Int32, exact:
         owner: shape (n_atoms,), variable of each atom.
         uniform: shape (n_variables,), random numbers in [0, 1).
         true: shape (n_variables,), the true atom of each variable or -1: the present world, then the new one.
-        exact: shape (n_variables,), set to False for variables that were not drawn uniformly.
+        steps: how many values to try in a part at most, besides 16 for each variable.
+
+    Returns:
+        Shape (2, n): the variables that were not drawn, part by part, and a number for each one's part.
     """
     reached, asked = np.zeros(len(f.none), np.bool_), np.zeros(len(f.row), np.bool_)
-    order, trial = np.empty(len(f.none), np.int32), np.empty(len(f.none), np.int32)
+    room, left, n_left = np.empty((2, len(f.none)), np.int64), np.empty((2, len(f.none)), np.int64), 0
+    order, trial = room[0], room[1]
     for v in range(len(f.none)):
         n_open = 0
         for a in range(f.first[v], f.first[v + 1]):
@@ -44,11 +46,14 @@ def draw(f: Factors, s: Slice, owner: Int32, uniform: Float, true: Int32, exact:
         if reached[root]:
             continue
         part = order[: reach(f, s, owner, root, reached, asked, order)]
-        n_worlds = list_worlds(f, s, part, trial, 0, 4096 + 16 * len(part))
+        n_worlds = list_worlds(f, s, part, trial, np.int64(0), np.int64(steps + 16 * len(part)))
         if n_worlds < 0:
-            exact[part] = False
-            walk(f, s, part, uniform, true)
+            for v in part:
+                left[0, n_left], left[1, n_left] = v, root
+                n_left += 1
             continue
-        list_worlds(f, s, part, trial, min(int(uniform[root] * n_worlds), n_worlds - 1) + 1, 1 << 62)
+        target = np.int64(min(int(uniform[root] * n_worlds), n_worlds - 1) + 1)
+        list_worlds(f, s, part, trial, target, np.int64(1 << 62))
         for d in range(len(part)):
             true[part[d]] = trial[d] if trial[d] >= f.first[part[d]] else -1
+    return left[:, :n_left]

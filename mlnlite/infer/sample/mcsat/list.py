@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from mlnlite.compiled import compiled
-from mlnlite.ground.network import Int32
+from mlnlite.ground.network import Int64
 from mlnlite.infer.sample.factors import Factors
 from mlnlite.infer.sample.mcsat.assign import assign
 from mlnlite.infer.sample.mcsat.slice import Slice
 
 
 @compiled
-def list_worlds(f: Factors, s: Slice, order: Int32, trial: Int32, target: int, steps: int) -> int:
+def list_worlds(f: Factors, s: Slice, order: Int64, trial: Int64, target: int, steps: int) -> int:
     """Counts the worlds of a part by depth-first search, or goes to one of them.
 
     Args:
@@ -29,7 +31,7 @@ def list_worlds(f: Factors, s: Slice, order: Int32, trial: Int32, target: int, s
     while depth >= 0:
         v = order[depth]
         if trial[depth] >= f.first[v] - 1:
-            assign(f, s, v, trial[depth], -1)
+            assign(f, s, v, trial[depth], np.int64(-1))
         trial[depth] += 1
         if trial[depth] == f.first[v] - 1 and not f.none[v]:
             trial[depth] += 1
@@ -39,7 +41,7 @@ def list_worlds(f: Factors, s: Slice, order: Int32, trial: Int32, target: int, s
             depth -= 1
             continue
         steps -= 1
-        if assign(f, s, v, trial[depth], 1):
+        if assign(f, s, v, trial[depth], np.int64(1)):
             if depth == len(order) - 1:
                 n_worlds += 1
                 if n_worlds == target:
@@ -50,6 +52,6 @@ def list_worlds(f: Factors, s: Slice, order: Int32, trial: Int32, target: int, s
         if steps < 0:
             for d in range(depth + 1):
                 if trial[d] >= f.first[order[d]] - 1:
-                    assign(f, s, order[d], trial[d], -1)
+                    assign(f, s, order[d], trial[d], np.int64(-1))
             return -1
     return n_worlds

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from mlnlite.compiled import compiled
-from mlnlite.ground.network import Bool, Int32
+from mlnlite.ground.network import Bool, Int32, Int64
 from mlnlite.infer.sample.factors import Factors
 from mlnlite.infer.sample.mcsat.slice import Slice
 
 
 @compiled
-def reach(f: Factors, s: Slice, owner: Int32, root: int, reached: Bool, asked: Bool, order: Int32) -> int:
+def reach(f: Factors, s: Slice, owner: Int32, root: int, reached: Bool, asked: Bool, order: Int64) -> int:
     """The variables that hang together with one of them through factors that the slice could still violate.
 
     Args:

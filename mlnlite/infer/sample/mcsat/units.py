@@ -35,5 +35,6 @@ def propagate(f: Factors, s: Slice, owner: Int32, queue: Int64, n_queued: int) -
         for m in range(f.scope[i], f.scope[i + 1]):
             if s.fixed[f.member[m]] < 0:
                 n_changed = fix(f, s, owner, choices, f.member[m], literal == (f.gain[m] > 0), changed, waits)
-                queue[n_queued : n_queued + n_changed] = changed[:n_changed]
-                n_queued += n_changed
+                for c in range(n_changed):
+                    queue[n_queued] = changed[c]
+                    n_queued += 1
