@@ -15,6 +15,7 @@ import mlnlite as ml
 from mlnlite.engines.duckdb import DuckDBEngine
 from mlnlite.engines.numpy import NumpyEngine
 from mlnlite.learn.data.merge import merged
+from mlnlite.learn.objectives import choose
 from mlnlite.learn.objectives.choose import pseudo_listed
 from mlnlite.learn.optimise import likelihood
 from tests import brute
@@ -22,7 +23,7 @@ from tests.models import evidence_texts, model_texts
 
 QUANTIFIED = [
     "EXIST y A(x, y)", "FORALL y A(x, y)", "S(x) => EXIST y A(x, y)", "EXIST y (A(x, y) ^ S(y))", "A(x, +y) v S(x)",
-    "EXIST x, y A(x, y)", "FORALL y (A(x, y) => S(y))", "count(A(x, y) | y) >= 2",
+    "EXIST x, y A(x, y)", "FORALL y (A(x, y) => S(y))", "count(A(x, y) | y) >= 2", "S(x) <=> EXIST y (A(x, y) ^ S(y))",
 ]  # fmt: skip
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
@@ -39,6 +40,20 @@ def choices_of(text, databases, engine=None):
     expanded = replace(model, templates=tuple(t.expanded(evidence.types) for t in model.templates))
     found = pseudo_listed(expanded, evidence, frozenset(model.predicates), engine or NumpyEngine())
     return expanded, evidence, merged(found, sum(len(t.weights) for t in expanded.templates))
+
+
+@settings(max_examples=50, deadline=None)
+@given(model_texts(hard=False), evidence_texts(complete=True), evidence_texts(complete=True))
+def test_ground_networks_and_joins_count_the_same(text, first, second):
+    """Every formula, also those without quantifiers and about blocks, by each of the two ways."""
+    values = []
+    for way in (False, True):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(choose, "ranges_widely", lambda template, databases, way=way: way)
+            model, _, found = choices_of(text, [first, second])
+        weights = np.random.default_rng(0).normal(size=sum(len(t.weights) for t in model.templates))
+        values.append(likelihood.at(found, weights).value)
+    assert values[0] == pytest.approx(values[1], abs=1e-9)
 
 
 @settings(max_examples=50, deadline=None)
@@ -69,13 +84,23 @@ def own_facts(names):
 @settings(max_examples=50, deadline=None)
 @given(
     st.lists(st.sampled_from(QUANTIFIED), min_size=1, max_size=2, unique=True),
-    st.tuples(own_facts("JK"), own_facts("LMN"), own_facts("J")),
+    st.tuples(own_facts("JK"), own_facts("LMNO"), own_facts("J")),
 )
 def test_quantifiers_range_over_the_constants_of_their_database(formulas, databases):
     model, evidence, found = choices_of("S(p)\nA(p, p)\n" + "".join(f"1 {f}\n" for f in formulas), databases)
     weights = np.random.default_rng(0).normal(size=sum(len(t.weights) for t in model.templates))
     value = brute.pseudo_log_likelihood(with_weights(model, evidence, weights), evidence)
     assert likelihood.at(found, weights).value == pytest.approx(value, abs=1e-9)
+
+
+def test_quantifiers_over_many_constants():
+    """Written out, the formula would be 2^14 cases."""
+    rng = np.random.default_rng(0)
+    facts = [f"S(P{i})" for i in range(0, 14, 2)] + [f"A(P{i}, P{j})" for i, j in enumerate(rng.integers(0, 14, 14))]
+    text = "S(p)\nA(p, p)\n1 S(x) => EXIST y (A(x, y) ^ S(y))"
+    model, evidence, found = choices_of(text, ["\n".join(facts)])
+    value = brute.pseudo_log_likelihood(with_weights(model, evidence, np.array([0.7])), evidence)
+    assert likelihood.at(found, np.array([0.7])).value == pytest.approx(value, abs=1e-9)
 
 
 def test_weights_without_bound_that_outgrow_each_other():

@@ -6,7 +6,7 @@ the data gives the bindings in which that literal decides, and a count gathers t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,20 +48,20 @@ Load = Callable[[Evidence], Run]
 
 
 def entries(
-    templates: Sequence[Template], evidence: Evidence, load: Load, targets: frozenset[str]
-) -> dict[str, Entries]:
-    """The entries of all templates for the atoms of each target predicate.
+    templates: Mapping[int, Template], first: Int64, evidence: Evidence, load: Load, targets: frozenset[str]
+) -> dict[str, list[Entries]]:
+    """The entries of templates for the atoms of each target predicate, in parts.
 
     Args:
-        templates: expanded.
+        templates: expanded, by number.
+        first: index of the first weight of every template.
         evidence: complete: every atom that is not a fact is false.
         load: as said there.
         targets: predicates whose atoms are counted for.
     """
     found: dict[str, list[Entries]] = {name: [] for name in targets}
     loaded: dict[bytes, tuple[Evidence, Run]] = {}
-    first = 0
-    for i, template in enumerate(templates):
+    for i, template in templates.items():
         for databases in _alike(template, evidence):
             if databases.tobytes() not in loaded:
                 part = evidence if len(databases) == evidence.n_databases else some_databases(evidence, databases)
@@ -71,10 +71,9 @@ def entries(
             for sign, case in _cases(source):
                 for target, (schema, _) in enumerate(case.literals):
                     if schema.predicate in targets:
-                        counted = _counted(source, case, target, sign, first, run)
+                        counted = _counted(source, case, target, sign, int(first[i]), run)
                         found[schema.predicate] += [replace(e, database=databases[e.database]) for e in counted]
-        first += len(template.weights)
-    return {name: _joined(parts, first) for name, parts in found.items()}
+    return found
 
 
 def _alike(template: Template, evidence: Evidence) -> list[Int64]:
@@ -143,7 +142,7 @@ def _plan(source: Source, case: Case, others: list[tuple[AtomSchema, bool]], tar
     return Count(plan, by)
 
 
-def _joined(parts: list[Entries], n_weights: int) -> Entries:
+def joined(parts: list[Entries], n_weights: int) -> Entries:
     """All entries of a predicate in order, those of one atom and weight added up."""
     if not parts:
         empty = np.empty(0, np.int64)

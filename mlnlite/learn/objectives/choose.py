@@ -16,11 +16,12 @@ from mlnlite.ground.ground import row_tables
 from mlnlite.ground.tables import tables_of
 from mlnlite.infer.deadline import Deadline
 from mlnlite.learn.data.choices import listed
-from mlnlite.learn.data.counts import entries
+from mlnlite.learn.data.counts import entries, joined
 from mlnlite.learn.data.merge import Listed, merged
 from mlnlite.learn.data.wide import Wide
 from mlnlite.learn.learned import How
 from mlnlite.learn.objectives.exact import Labels, compiled
+from mlnlite.learn.objectives.quantified import ground_entries, ranges_widely
 from mlnlite.learn.optimise.newton import Optimum
 from mlnlite.learn.optimise.problem import Problem, problem_of
 from mlnlite.learn.optimise.solve import Solution, solve, solve_hierarchical, start_of
@@ -156,8 +157,17 @@ def pseudo_listed(model: Model, databases: Evidence, targets: frozenset[str], en
     def load(some: Evidence) -> Run:
         return (engine or engine_for()).load({**tables_of(some), **row_tables(model)})
 
-    found = entries(model.templates, evidence, load, targets)
-    return listed(found, evidence, sum(len(t.weights) for t in model.templates))
+    first = np.cumsum([0, *(len(t.weights) for t in model.templates)])
+    wide = [i for i, t in enumerate(model.templates) if ranges_widely(t, databases)]
+    joined_up = {i: t for i, t in enumerate(model.templates) if i not in wide}
+    found = entries(joined_up, first, evidence, load, targets)
+    if wide:
+        some = replace(without_weights(model), templates=tuple(without_weights(model).templates[i] for i in wide))
+        weights = np.concatenate([np.arange(first[i], first[i + 1]) for i in wide])
+        for name, parts in ground_entries(some, databases, targets, engine).items():
+            found[name] += [replace(e, weight=weights[e.weight]) for e in parts]
+    every = {name: joined(parts, int(first[-1])) for name, parts in found.items()}
+    return listed(every, evidence, int(first[-1]))
 
 
 def pseudo_problem(model: Model, databases: Evidence, targets: frozenset[str], engine: Engine | None = None) -> Problem:
