@@ -28,12 +28,12 @@ class Marginals(Rows[float]):
         probabilities: shape (n,).
         methods: how each was found: "evidence", "closed form", "elimination", ...
         exact: shape (n,), whether the probability is exact to machine precision.
-        error: shape (n,), standard error of each, 0 where exact.
+        error: shape (n,), standard error of each, 0 where exact; for bounded elimination what it can be off at most.
         status: "exact", or what else can be said of the whole.
         log_z: log partition function, nan if it is not known.
         statistics: what it took.
         block: shape (n,), number of the functional block of each atom, -1 for none.
-        low: shape (n,), lower end of a 95 % interval; the probability itself where exact.
+        low: shape (n,), lower end of a 95 % interval (of a certain one if bounded); the probability itself where exact.
         high: shape (n,), its upper end.
         r_hat: shape (n,), rank-normalised split R-hat, nan where not sampled or never seen to change.
         effective_size: shape (n,), effective sample size, nan likewise.
