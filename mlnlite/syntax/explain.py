@@ -66,6 +66,7 @@ _WORDS = {
     "RPAR": "`)`",
     "LBRACE": "`{`",
     "RBRACE": "`}`",
+    "RBRACKET": "`]`",
     "NOT": "`!`",
     "QUESTION": "`?`",
     "EQUAL": "`=`",

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import mlnlite as ml
@@ -86,6 +86,7 @@ def test_real_files_with_mistakes(dialect):
 @pytest.mark.parametrize("dialect", DIALECTS)
 @settings(max_examples=25, deadline=None)
 @given(text=st.lists(st.sampled_from(PIECES), max_size=40).map("".join))
+@example(text="[p=0.5:")
 def test_pieces(dialect, text):
     survives(text, dialect)
 
