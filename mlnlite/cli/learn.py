@@ -110,13 +110,15 @@ def learn(**options: Unpack[_Options]) -> None:
     and the summary to standard error.
     """
     inputs = _Inputs(*split_files(options["files"], options["model"], options["database"]))
-    learned, report, unseen = _learned(inputs, options)
+    learned, databases = _learned(inputs, options)
     text = header(learned, inputs.models, inputs.databases, options["seed"]) + learned_text(learned)
-    if options["laplace_path"] is not None:
-        _write_path(learned, options["laplace_path"])
     output = options["output"]
     if output is not None:
         write_whole(output, text)
+    if options["laplace_path"] is not None:
+        _write_path(learned, options["laplace_path"])
+    unseen = None if options["held_out"] is None else _held_out(learned, options["held_out"])
+    report = None if options["report"] is None else _report(learned, databases, options)
     if options["format"] == "json":
         where = {"model": text} if output is None else {"output": str(output)}
         more: dict[str, object] = {} if report is None else {"report": report.to_dict()}
@@ -129,8 +131,8 @@ def learn(**options: Unpack[_Options]) -> None:
     click.echo(text if output is None else f"{'written to':<36}{output}", nl=output is not None)
 
 
-def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report | None, tuple[str, float] | None]:
-    """What was learnt, the report on it, and how probable other databases are."""
+def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Evidence]:
+    """What was learnt, and from what."""
     import mlnlite as ml
 
     model, databases = read(inputs.models, inputs.databases, options["dialect"])
@@ -155,14 +157,16 @@ def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Report |
             seed=options["seed"],
             time_limit=options["time_limit"],
         )
-    method, held = options["report"], options["held_out"]
-    unseen = None if held is None else _held_out(learned, held)
-    if method is None:
-        return learned, None, unseen
+    return learned, databases
+
+
+def _report(learned: LearnedModel, databases: Evidence, options: _Options) -> Report:
+    """How sure the weights are."""
     from mlnlite.learn.trust.report import report
 
+    assert options["report"] is not None
     with working("measuring"):
-        return learned, report(learned, databases, method=method, seed=options["seed"]), unseen
+        return report(learned, databases, method=options["report"], seed=options["seed"])
 
 
 def _held_out(learned: LearnedModel, file: Path) -> tuple[str, float]:

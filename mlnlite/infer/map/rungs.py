@@ -8,6 +8,7 @@ from typing import Literal, TypedDict, get_args
 
 from mlnlite.errors import QueryMistake, did_you_mean
 from mlnlite.ground.network import Int64
+from mlnlite.infer.approach import verify_run
 from mlnlite.infer.deadline import Deadline
 from mlnlite.infer.map import ilp, maxsat, mincut, relaxation, toulbar2
 from mlnlite.infer.map.cuts import cycles
@@ -19,7 +20,6 @@ Method = Literal["auto", "ve", "mincut", "ilp", "wcsp", "maxsat", "annealing", "
 METHODS: tuple[Method, ...] = get_args(Method)
 _FEW, _MANY, _TOO_MANY = 400, 20_000, 3_000_000
 _CYCLES_UP_TO = 20_000
-_LARGEST_SEED = 2**31 - 1
 _NODES, _BACKTRACKS, _WORK = 50, (200, 50_000), 10_000_000
 """How much of a rung is a try: nodes of an integer program; backtracks, at least, at most and by number of cells."""
 
@@ -42,12 +42,9 @@ def verify(*, method: str = "auto", time_limit: float | None = None, seed: int =
     if method not in METHODS:
         hint = did_you_mean(method, METHODS) or f"one of {', '.join(METHODS)}"
         raise QueryMistake(f"there is no method {method} for most probable worlds", hint)
-    if time_limit is not None and not time_limit > 0:
-        raise QueryMistake(f"a time limit of {time_limit} s leaves no time", "give more than 0 s, or no limit")
     if not gap >= 0:
         raise QueryMistake(f"a gap of {gap} is no share of a cost", "0 asks for a proof, .01 for one per cent")
-    if not 0 <= seed <= _LARGEST_SEED or int(seed) != seed:
-        raise QueryMistake(f"{seed} is no seed", f"give a whole number from 0 to {_LARGEST_SEED}")
+    verify_run(time_limit, seed)
 
 
 @dataclass(frozen=True, slots=True)
