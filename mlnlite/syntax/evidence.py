@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mlnlite.syntax.bulk import Vocabulary
 
 MAX_MISTAKES = 100
-BULK = 1 << 21
+BULK = 1 << 22
 """Characters from which on facts are read by compiled code, which takes .4 s to load."""
 # A fact on a line of its own, without escapes in quotes: a subset of what the grammar accepts.
 _WORD = r"-?\w(?:[\w\'$~\\]|[-.:;/](?=\w))*+"
