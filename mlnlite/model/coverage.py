@@ -19,6 +19,9 @@ def coverage(evidence: Evidence) -> tuple[Diagnostic, ...]:
     return tuple(_warnings(evidence))
 
 
+_FIRST_OF_NUMBERS = frozenset("-0123456789")
+
+
 def _warnings(evidence: Evidence) -> Iterator[Diagnostic]:
     for name, facts in evidence.facts.items():
         lacking = np.setdiff1d(np.arange(evidence.n_databases), facts.database)
@@ -36,8 +39,8 @@ def same_number(constants: Sequence[str]) -> tuple[int, int] | None:
     (1, 3)
     """
     seen: dict[float, int] = {}
-    for i, name in enumerate(constants):
-        value = number_of(name) if name[:1].isdigit() or name[:1] == "-" else None
+    for i in [i for i, name in enumerate(constants) if name[:1] in _FIRST_OF_NUMBERS]:
+        value = number_of(constants[i])
         if value is not None and seen.setdefault(value, i) != i:
             return seen[value], i
     return None
