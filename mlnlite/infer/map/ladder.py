@@ -33,6 +33,8 @@ _CHEAP = 1 << 18
 _CHEAP_IN_ALL = 1 << 20
 _DENSE, _SPARSE, _MANY = 16, 5, 2000
 _AT_ONCE, _FEW_CELLS = 100_000, 2000
+_LOGICAL = 4
+"""States of a counting factor that forbids something up to which its logic is drawn upon, as that of clauses."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,7 @@ def map_of(
     deadline = in_seconds(time_limit)
     options = Options(method, deadline, seed, gap)
     with interruptible(deadline):
-        tied, ties = contracted(potentials_of(network, max_arity=np.inf, chained=True))
+        tied, ties = contracted(potentials_of(network, max_arity=np.inf, chained=True, logical=_LOGICAL))
         leaves: tuple[Leaves, ...] = ()
         found = _at_once(tied, options)
         if found is None:

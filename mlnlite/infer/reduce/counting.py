@@ -28,6 +28,11 @@ class Diagram:
     after: tuple[Int64, ...]
     worth: Float
 
+    @property
+    def n_states(self) -> int:
+        """The most states that there are at one place."""
+        return max(len(self.worth), *(len(states) for states in self.after))
+
 
 def diagram(worth: Float, steps: Int32) -> Diagram | None:
     """The smallest chain for a function of a count.

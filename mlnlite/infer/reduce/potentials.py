@@ -39,6 +39,7 @@ def potentials_of(
     max_arity: float = MAX_ARITY,
     *,
     chained: bool = False,
+    logical: int = 0,
 ) -> Potentials:
     """The log-potentials of a network.
 
@@ -48,6 +49,7 @@ def potentials_of(
         auxiliary: number of those.
         max_arity: longer conjunctions become chains of auxiliary variables.
         chained: leave counting factors as `chains`, do not write them out as cells.
+        logical: but write out those that forbid something and need at most so many states: what they force is drawn.
 
     Raises:
         QueryMistake: a weight is not known.
@@ -60,11 +62,14 @@ def potentials_of(
     for tables in network.tables:
         rows += _table_rows(network, tables)
     cardinality = np.concatenate([network.cardinality, np.full(auxiliary, 2, np.int32)])
-    chains = chains_of(network)
-    for chain in [] if chained else chains:
+    chains: list[Chains] = []
+    for chain in chains_of(network):
         plan = diagram(chain.worth, chain.steps)
         if plan is None:
             return Potentials(cardinality, (), -np.inf)
+        if chained and (plan.n_states > logical or np.isfinite(chain.worth).all()):
+            chains.append(chain)
+            continue
         add, cardinality, _ = written_out(chain, plan, cardinality)
         rows += add
     narrow: list[Conjunctions] = []
@@ -75,7 +80,7 @@ def potentials_of(
     for row in narrow:
         add_cells, gain = cells_of(row, cardinality)
         cells, constant = [*cells, *add_cells], constant + gain
-    return Potentials(cardinality, *propagate(cells, cardinality, constant), tuple(chains) if chained else ())
+    return Potentials(cardinality, *propagate(cells, cardinality, constant), tuple(chains))
 
 
 def check_weights(network: Network) -> None:
