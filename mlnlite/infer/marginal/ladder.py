@@ -127,6 +127,10 @@ def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple
 
     counted, rung = with_counts(network), _rung_for_wide(network, approach)
     small, merged = _merged(counted, asked, found, approach, (limit, _FAIR))
+    if merged is found:  # nothing excludes each other
+        merged = marginals_of(network, asked, width_limit=limit, too_wide="leave")
+        if not merged.wide:
+            return network, network, merged
     refuses = approach.method == "exact"
     if merged.wide and (refuses or rung is not None or merged.costly or len(counted.counts) > len(network.counts)):
         found = marginals_of(counted, asked, width_limit=limit, too_wide="leave", rung=rung)
