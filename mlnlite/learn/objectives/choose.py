@@ -21,7 +21,7 @@ from mlnlite.learn.data.merge import Listed, merged
 from mlnlite.learn.data.wide import Wide
 from mlnlite.learn.learned import How
 from mlnlite.learn.objectives.exact import Labels, compiled
-from mlnlite.learn.objectives.quantified import ground_entries, ranges_widely
+from mlnlite.learn.objectives.quantified import ground_entries, ranges_widely, without_weights
 from mlnlite.learn.optimise.newton import Optimum
 from mlnlite.learn.optimise.problem import Problem, problem_of
 from mlnlite.learn.optimise.solve import Solution, solve, solve_hierarchical, start_of
@@ -158,14 +158,18 @@ def pseudo_listed(model: Model, databases: Evidence, targets: frozenset[str], en
         return (engine or engine_for()).load({**tables_of(some), **row_tables(model)})
 
     first = np.cumsum([0, *(len(t.weights) for t in model.templates)])
-    wide = [i for i, t in enumerate(model.templates) if ranges_widely(t, databases)]
-    joined_up = {i: t for i, t in enumerate(model.templates) if i not in wide}
-    found = entries(joined_up, first, evidence, load, targets)
-    if wide:
-        some = replace(without_weights(model), templates=tuple(without_weights(model).templates[i] for i in wide))
-        weights = np.concatenate([np.arange(first[i], first[i + 1]) for i in wide])
-        for name, parts in ground_entries(some, databases, targets, engine).items():
-            found[name] += [replace(e, weight=weights[e.weight]) for e in parts]
+    wide = {i: t for i, t in enumerate(model.templates) if ranges_widely(t, databases)}
+    others = {i: t for i, t in enumerate(model.templates) if i not in wide}
+    found = entries(others, first, evidence, load, targets)
+    for i, template in wide.items():
+        try:
+            more = ground_entries(model, i, databases, targets, engine)
+        except LimitReached as reason:  # an open quantified part: written out, if that is possible
+            try:
+                more = entries({i: template}, first, evidence, load, targets)
+            except LimitReached:
+                raise reason from None
+        found = {name: [*parts, *more[name]] for name, parts in found.items()}
     every = {name: joined(parts, int(first[-1])) for name, parts in found.items()}
     return listed(every, evidence, int(first[-1]))
 
@@ -174,12 +178,6 @@ def pseudo_problem(model: Model, databases: Evidence, targets: frozenset[str], e
     """The pseudo-likelihood; the model is expanded."""
     n_weights = sum(len(t.weights) for t in model.templates)
     return problem_of(model, merged(pseudo_listed(model, databases, targets, engine), n_weights))
-
-
-def without_weights(model: Model) -> Model:
-    """The model with all weights 0 that are learnt."""
-    zero = (t if t.hard or t.fixed else replace(t, weights=np.zeros(len(t.weights))) for t in model.templates)
-    return replace(model, templates=tuple(zero))
 
 
 # --- solving

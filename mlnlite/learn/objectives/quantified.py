@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 from math import prod
 
@@ -30,20 +31,32 @@ def ranges_widely(template: Template, databases: Evidence) -> bool:
     return prod(size[v.type] for v in variables if v.bound) > _FEW and prod(size[v.type] for v in variables) <= _MOST
 
 
+def without_weights(model: Model) -> Model:
+    """The model with all weights 0 that are learnt."""
+    zero = (t if t.hard or t.fixed else replace(t, weights=np.zeros(len(t.weights))) for t in model.templates)
+    return replace(model, templates=tuple(zero))
+
+
 def ground_entries(
-    model: Model, databases: Evidence, targets: frozenset[str], engine: Engine | None
+    model: Model, number: int, databases: Evidence, targets: frozenset[str], engine: Engine | None
 ) -> dict[str, list[Entries]]:
     """What each atom of the target predicates changes; all other predicates are known, as the definition has it.
 
     Args:
-        model: expanded, of formulas with quantifiers; weights do not matter.
+        model: expanded; weights do not matter.
+        number: of the template.
         databases: the data, complete.
         targets: predicates that are predicted.
         engine: what runs the plans.
+
+    Raises:
+        LimitReached: what is counted is a formula of several unknown atoms.
     """
     found: dict[str, list[Entries]] = {name: [] for name in targets}
     networks: dict[tuple[object, ...], Network] = {}
-    used = {atom.predicate for t in model.templates for atom in t.formula.atoms}
+    first = sum(len(t.weights) for t in model.templates[:number])
+    used = {atom.predicate for atom in model.templates[number].formula.atoms}
+    model = without_weights(replace(model, templates=(model.templates[number],)))
     for name, i in product(sorted(targets & used), range(databases.n_databases)):
         given, data = conditions(databases, i, frozenset([name]), frozenset()), one_database(databases, i)
         same = name, *content(given, given.predicates)
@@ -53,5 +66,5 @@ def ground_entries(
         true = data.atom_number(name, facts.arguments[facts.truth])
         changes = flips(network, np.isin(network.atoms, true))
         database = np.full(len(changes.atom), i, np.int64)
-        found[name].append(Entries(database, network.atoms[changes.atom], changes.weight, changes.change))
+        found[name].append(Entries(database, network.atoms[changes.atom], first + changes.weight, changes.change))
     return found

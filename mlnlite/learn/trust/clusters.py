@@ -12,8 +12,9 @@ from mlnlite.ground.network import Network
 from mlnlite.learn.data.merge import Listed, merged
 from mlnlite.learn.data.worlds import components
 from mlnlite.learn.learned import LearnedModel
-from mlnlite.learn.objectives.choose import pseudo_listed, tied_of, without_weights, worth_of
+from mlnlite.learn.objectives.choose import pseudo_listed, tied_of, worth_of
 from mlnlite.learn.objectives.exact import compiled, conditions
+from mlnlite.learn.objectives.quantified import without_weights
 from mlnlite.learn.optimise.problem import Problem, problem_of
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
