@@ -12,7 +12,20 @@ from math import prod
 
 import numpy as np
 
-from mlnlite.engines.plan import AntiJoin, Compute, Count, Join, Lookup, One, Plan, Project, Scan, Union, Where
+from mlnlite.engines.plan import (
+    AntiJoin,
+    Compute,
+    Count,
+    Join,
+    Lookup,
+    One,
+    Plan,
+    Project,
+    Scan,
+    Union,
+    Where,
+    columns_of,
+)
 from mlnlite.ground.tables import KNOWN_FALSE
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import Argument, AtomRef, AtomSchema, Const, Equal, Formula, Var
@@ -113,7 +126,7 @@ def bindings(source: Source, cube: Cube, needed: Sequence[int]) -> Plan:
         plan, bound = _spread(plan, bound, equal)
         plan, filters = _filtered(plan, bound, filters)
         if waiting:
-            best = min(waiting, key=lambda g: (bool(bound) and not g[1] & bound, g[2]))
+            best = min(waiting, key=lambda g: _growth(source, g, bound))
             waiting.remove(best)
             plan, bound = _joined(plan, best[0]), bound | best[1]
         elif not wanted <= bound:
@@ -194,6 +207,13 @@ def _spread(plan: Plan, bound: set[int], equal: list[Equal]) -> tuple[Plan, set[
                     bound = bound | {to.index}
                     changed = True
     return plan, bound
+
+
+def _growth(source: Source, generator: tuple[Plan, set[int], int], bound: set[int]) -> float:
+    """About how many rows of a generator fit a binding: its rows are spread evenly over constants and databases."""
+    plan, variables, size = generator
+    n_worlds = source.evidence.n_databases if source.world in columns_of(plan) else 1
+    return size / (n_worlds * prod(max(1, _n_constants(source, v)) for v in variables & bound))
 
 
 def _joined(plan: Plan, other: Plan) -> Plan:

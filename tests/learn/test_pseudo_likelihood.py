@@ -122,3 +122,14 @@ def test_engines_agree(text, facts):
         model, _, found = choices_of(text, [facts], engine)
         values.append(likelihood.at(found, np.linspace(-1, 1, sum(len(t.weights) for t in model.templates))).value)
     assert values[0] == pytest.approx(values[1], abs=1e-12)
+
+
+def test_joins_follow_the_facts_not_the_weights():
+    """Each database has one value of each part: the 10,000 rows of the template come last, and once."""
+    parts = "abcd"
+    model = ml.model_from_text(
+        "\n".join(f"{p.upper()}({p})" for p in parts) + "\n" + " ^ ".join(f"{p.upper()}(+{p})" for p in parts)
+    )
+    worlds = ["\n".join(f"{p.upper()}({p}{(7 * i + k) % 10})" for k, p in enumerate(parts)) for i in range(40)]
+    data = ml.evidence_from_text("\n---\n".join(worlds), model=model)
+    assert ml.learn(model, data, engine=NumpyEngine(2_000)).status == "converged"
