@@ -41,9 +41,8 @@ def learn(  # noqa: PLR0913
 ) -> LearnedModel:
     """Weights that make the databases most likely.
 
-    An atom that is not a fact is false, unless it is marked `?` or open. By default each atom, or block, is predicted
-    from all others (pseudo-likelihood: Besag 1975; Richardson and Domingos 2006); where atoms are unknown, the
-    likelihood of what is known is maximised. Ctrl-C leaves the best weights so far.
+    An atom that is not a fact is false, unless it is marked `?` or open. By default the pseudo-likelihood is maximised
+    (Besag 1975; Richardson and Domingos 2006), or where atoms are unknown, the likelihood of what is known.
 
     Args:
         model: its weights are ignored, except fixed ones and hard formulas.
@@ -57,7 +56,7 @@ def learn(  # noqa: PLR0913
         database_weights: shape (n_databases,), how often each database counts; by default once.
         resume: start with the weights that the model has.
         seed: of sampling and of searches.
-        time_limit: seconds after which to stop with the best weights so far.
+        time_limit: seconds after which to stop with the best weights so far, as Ctrl-C does.
         engine: what runs the counting joins; by default chosen by size.
 
     Raises:
@@ -66,12 +65,10 @@ def learn(  # noqa: PLR0913
         EvidenceMistake: if a block that must have a value has none, or facts have probabilities.
     """
     deadline, prior, start = in_seconds(time_limit), prior_of(prior), monotonic()
-    targets, unknown = _names(model, predict, "predict"), _names(model, frozenset(open_predicates), "leave open")
-    objective, names = _objective(objective, unknown, model, databases, targets), None if predict is None else targets
-    how = _how(objective, names, unknown, tied, database_weights)
+    how = _how(model, databases, objective, (predict, open_predicates), tied, database_weights)
     model = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
     with interruptible(deadline):
-        task = task_of(model, databases, how, targets, engine)
+        task = task_of(model, databases, how, _names(model, how.predict, "predict"), engine)
         counted = monotonic()
         solution = solved(model, task, prior, Search(_start(model) if resume else None, seed, deadline))
     learned = _learned(replace(model, types=_types(model, databases)), task.problem, solution)
@@ -80,15 +77,18 @@ def learn(  # noqa: PLR0913
 
 
 def _how(
-    objective: Objective,
-    predict: frozenset[str] | None,
-    unknown: frozenset[str],
+    model: Model,
+    databases: Evidence,
+    objective: str | None,
+    names: tuple[Iterable[str] | None, Iterable[str]],
     tied: Sequence[Sequence[str]],
     database_weights: Sequence[float] | None,
 ) -> How:
-    """What is to be learnt, as the learnt model remembers it."""
+    """What is to be learnt, as the learnt model remembers it; `names` are those of what is predicted and open."""
+    predict = None if names[0] is None else _names(model, names[0], "predict")
+    unknown = _names(model, frozenset(names[1]), "leave open")
     return How(
-        objective,
+        _objective(objective, unknown, model, databases, _names(model, predict, "predict")),
         None if predict is None else tuple(sorted(predict)),
         tuple(sorted(unknown)),
         tuple(map(tuple, tied)),
