@@ -66,7 +66,9 @@ class _Options(TypedDict):
 @click.option(
     "--repeats", type=click.IntRange(min=1), default=1, show_default=True, help="How often, with other folds."
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the folds and of the bootstrap.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the folds and of the bootstrap."
+)
 @output_option
 @dialect_option
 @format_option("text", "json")

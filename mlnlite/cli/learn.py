@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
@@ -12,11 +12,19 @@ import click
 from mlnlite.cli.files import write_whole
 from mlnlite.cli.header import header
 from mlnlite.cli.learning import learning_options, prior_of, read, split_files
-from mlnlite.cli.options import FILE, dialect_option, format_option, names, output_option, time_limit_option
+from mlnlite.cli.options import (
+    FILE,
+    dialect_option,
+    format_option,
+    names,
+    output_option,
+    time_limit_option,
+    writable,
+)
 from mlnlite.cli.terminal import working
 
 if TYPE_CHECKING:
-    from mlnlite.learn.learned import LearnedModel, Objective
+    from mlnlite.learn.learned import How, LearnedModel, Objective
     from mlnlite.learn.trust.report import Report
     from mlnlite.model.evidence import Evidence
     from mlnlite.model.model import Model
@@ -55,6 +63,15 @@ class _Inputs:
     databases: tuple[Path, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Data:
+    """What weights are learnt from, and what else is asked about; `unseen` are held-out databases."""
+
+    model: Model
+    databases: Evidence
+    unseen: Evidence | None
+
+
 @click.command()
 @learning_options
 @output_option
@@ -74,6 +91,7 @@ class _Inputs:
 @click.option(
     "--laplace-path",
     type=FILE,
+    callback=writable,
     metavar="FILE",
     help="Also write a table (CSV) of the weights under Laplace priors of all scales.",
 )
@@ -96,7 +114,7 @@ class _Inputs:
     help="Also say how sure each weight is, from clusters of the data, the curvature, or simulated data; and which "
     "weights not to trust.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of all that is drawn.")
 @time_limit_option("Stop after this long, with the best weights so far.")
 @dialect_option
 @format_option("text", "json")
@@ -110,15 +128,15 @@ def learn(**options: Unpack[_Options]) -> None:
     and the summary to standard error.
     """
     inputs = _Inputs(*split_files(options["files"], options["model"], options["database"]))
-    learned, databases = _learned(inputs, options)
+    learned, data = _learned(inputs, options)
     text = header(learned, inputs.models, inputs.databases, options["seed"]) + learned_text(learned)
     output = options["output"]
     if output is not None:
         write_whole(output, text)
     if options["laplace_path"] is not None:
         _write_path(learned, options["laplace_path"])
-    unseen = None if options["held_out"] is None else _held_out(learned, options["held_out"])
-    report = None if options["report"] is None else _report(learned, databases, options)
+    unseen = None if data.unseen is None else _held_out(learned, data.unseen)
+    report = None if options["report"] is None else _report(learned, data.databases, options)
     if options["format"] == "json":
         where = {"model": text} if output is None else {"output": str(output)}
         more: dict[str, object] = {} if report is None else {"report": report.to_dict()}
@@ -131,33 +149,79 @@ def learn(**options: Unpack[_Options]) -> None:
     click.echo(text if output is None else f"{'written to':<36}{output}", nl=output is not None)
 
 
-def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, Evidence]:
-    """What was learnt, and from what."""
+def _learned(inputs: _Inputs, options: _Options) -> tuple[LearnedModel, _Data]:
+    """What was learnt, and from what; all that is asked is verified first."""
     import mlnlite as ml
 
-    model, databases = read(inputs.models, inputs.databases, options["dialect"])
-    if options["shared_constants"]:
-        databases = ml.with_shared_constants(databases)
-    predict = names(options["predict"])
+    data = _read(inputs, options)
+    prior = prior_of(options["prior"], options["prior_sd"], options["prior_of"])
+    worth = _database_weights(data.databases, options["times"])
+    how = _how(data, options, worth)
     if options["structure"]:
-        model, predict = _with_rules(model, databases, options), _predicates(predict)
-    elif options["given"]:
-        raise click.UsageError("--given says what rules may ask about; add --structure to look for some")
+        data = replace(data, model=_with_rules(data.model, data.databases, options))
+        data = replace(data, unseen=_unseen(data.model, data.databases, options))
+        how = _how(data, options, worth)
+    _verify(data, how, options)
     with working("learning"):
         learned = ml.learn(
-            model,
-            databases,
-            objective=options["objective"],
-            predict=predict or None,
-            open_predicates=names(options["open_predicates"]),
-            prior=prior_of(options["prior"], options["prior_sd"], options["prior_of"]),
-            tied=[[name.strip() for name in group.split(";")] for group in options["tie"]],
-            database_weights=_database_weights(databases, options["times"]),
+            data.model,
+            data.databases,
+            objective=how.objective,
+            predict=how.predict,
+            open_predicates=how.open_predicates,
+            prior=prior,
+            tied=how.tied,
+            database_weights=how.database_weights,
             resume=options["resume"],
             seed=options["seed"],
             time_limit=options["time_limit"],
         )
-    return learned, databases
+    return learned, data
+
+
+def _read(inputs: _Inputs, options: _Options) -> _Data:
+    """The files."""
+    import mlnlite as ml
+
+    if options["given"] and not options["structure"]:
+        raise click.UsageError("--given says what rules may ask about; add --structure to look for some")
+    if options["structure"] and not options["predict"]:
+        raise click.UsageError("--structure needs --predict: what the rules are to conclude")
+    model, databases = read(inputs.models, inputs.databases, options["dialect"])
+    if options["shared_constants"]:
+        databases = ml.with_shared_constants(databases)
+    return _Data(model, databases, _unseen(model, databases, options))
+
+
+def _unseen(model: Model, databases: Evidence, options: _Options) -> Evidence | None:
+    """The held-out databases."""
+    import mlnlite as ml
+    from mlnlite.learn.weights import with_constants
+
+    file = options["held_out"]
+    return None if file is None else ml.read_evidence(file, model=with_constants(model, databases))
+
+
+def _how(data: _Data, options: _Options, worth: list[float] | None) -> How:
+    """What is to be learnt."""
+    from mlnlite.learn.weights import how_of
+
+    predict = names(options["predict"])
+    targets = (_predicates(predict) if options["structure"] else predict) or None
+    tied = [[name.strip() for name in group.split(";")] for group in options["tie"]]
+    opened = names(options["open_predicates"])
+    return how_of(data.model, data.databases, options["objective"], (targets, opened), tied, worth)
+
+
+def _verify(data: _Data, how: How, options: _Options) -> None:
+    """Complains of what is asked of the weights and cannot be had, before a long wait for them."""
+    method, path = options["report"], options["laplace_path"] is not None
+    if method is None and not path and data.unseen is None:
+        return
+    from mlnlite.learn.trust.verify import verify  # late: most learning needs no tests of weights
+
+    with working("verifying"):
+        verify(data.model, data.databases, how, method=method, path=path, held_out=data.unseen)
 
 
 def _report(learned: LearnedModel, databases: Evidence, options: _Options) -> Report:
@@ -169,13 +233,13 @@ def _report(learned: LearnedModel, databases: Evidence, options: _Options) -> Re
         return report(learned, databases, method=options["report"], seed=options["seed"])
 
 
-def _held_out(learned: LearnedModel, file: Path) -> tuple[str, float]:
-    """How probable the databases of a file are, and by which measure."""
+def _held_out(learned: LearnedModel, databases: Evidence) -> tuple[str, float]:
+    """How probable other databases are, and by which measure."""
     import mlnlite as ml
     from mlnlite.learn.trust.effects import has_unknown
 
-    databases = ml.read_evidence(file, model=learned.model)
-    measure = "log-likelihood" if has_unknown(learned, databases) else "pseudo-log-likelihood"
+    unknown = has_unknown(learned.model, databases, learned.how)
+    measure = "log-likelihood" if unknown else "pseudo-log-likelihood"
     return measure, ml.held_out(learned, databases)
 
 
@@ -212,8 +276,6 @@ def _with_rules(model: Model, databases: Evidence, options: _Options) -> Model:
     import mlnlite as ml
 
     predict = names(options["predict"])
-    if not predict:
-        raise click.UsageError("--structure needs --predict: what the rules are to conclude")
     others = [name for name in model.predicates if name not in _predicates(predict)]
     given = names(options["given"]) or others
     with working("looking for rules"):

@@ -97,10 +97,11 @@ def _prior(family: str, sd: float | None, mean: float = 0.0) -> OnePrior | None:
             raise click.UsageError("--prior none and --prior-sd exclude each other")
         return None
     if family == "laplace":
-        return Laplace(sd or 1.0)
+        return Laplace(1.0 if sd is None else sd)
     if family == "cauchy":
-        return Cauchy(sd or 2.5)
-    return Hierarchical(sd or DEFAULT_SD) if family == "hierarchical" else Gaussian(sd or DEFAULT_SD, mean)
+        return Cauchy(2.5 if sd is None else sd)
+    sd = DEFAULT_SD if sd is None else sd
+    return Hierarchical(sd) if family == "hierarchical" else Gaussian(sd, mean)
 
 
 def split_files(

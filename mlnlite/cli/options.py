@@ -22,7 +22,8 @@ def _remember(ctx: click.Context, _: click.Parameter, value: str) -> str:
     return value
 
 
-def _writable(_: click.Context, __: click.Parameter, value: Path | None) -> Path | None:
+def writable(_: click.Context, __: click.Parameter, value: Path | None) -> Path | None:
+    """A file to write, refused before any work if it cannot be."""
     if value is not None:
         verify_writable(value)
     return value
@@ -51,7 +52,7 @@ output_option = click.option(
     "-o",
     "--output",
     type=FILE,
-    callback=_writable,
+    callback=writable,
     help="File to write; it appears when it is complete. By default standard output.",
 )
 TOGETHER = "Facts that are known: .db files, NAME=TABLE (CSV, Parquet, ...), .toml mappings; together one world."

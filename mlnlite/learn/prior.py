@@ -110,15 +110,17 @@ def prior_of(given: Prior | float | None) -> Prior | None:
     """The prior that a user means: a number is the standard deviation of a Gaussian.
 
     Raises:
-        QueryMistake: if a scale is not positive.
+        QueryMistake: if a scale is not a positive number, or a mean is no number.
     """
     prior = Gaussian(given) if isinstance(given, int | float) else given
     every = [] if prior is None else prior.values() if isinstance(prior, Mapping) else [prior]
     for one in every:
-        if isinstance(one, Gaussian | Hierarchical) and not one.sd > 0:
-            raise QueryMistake(f"the standard deviation of the prior must be positive, found {one.sd:g}")
-        if isinstance(one, Laplace | Cauchy) and not one.scale > 0:
-            raise QueryMistake(f"the scale of the prior must be positive, found {one.scale:g}")
+        scale = 1.0 if one is None else one.sd if isinstance(one, Gaussian | Hierarchical) else one.scale
+        if not 0 < scale < np.inf:
+            hint = "for none say prior=None (`--prior none`)" if scale == np.inf else ""
+            raise QueryMistake(f"the scale of a prior is a positive number, found {scale:g}", hint)
+        if isinstance(one, Gaussian) and not np.isfinite(one.mean):
+            raise QueryMistake(f"the mean of a prior is a number, found {one.mean:g}")
     return prior
 
 
@@ -137,6 +139,19 @@ def prior_of_each(prior: Prior | None, templates: Sequence[Template]) -> list[On
             raise QueryMistake([Diagnostic("E520", f"there is no formula {name!r} to give a prior", hint=hint)])
     default = prior.get("*")
     return [prior.get(t.name, prior.get(t.text, default)) for t in templates]
+
+
+def verify_prior(prior: Prior | None, templates: Sequence[Template], objective: str) -> None:
+    """Complains of a prior that does not fit the formulas, or what is maximised.
+
+    Raises:
+        QueryMistake: if a name is of no formula, or weights of max-margin learning have no Gaussian prior.
+    """
+    each = prior_of_each(prior, templates)
+    learnt = [one for one, t in zip(each, templates, strict=True) if not (t.hard or t.fixed)]
+    if objective == "max-margin" and not all(isinstance(one, Gaussian) for one in learnt):
+        hint = "its standard deviation, squared, is the usual C"
+        raise QueryMistake("max-margin learning needs a Gaussian prior of each weight", hint)
 
 
 def penalty_of(prior: Prior | None, templates: Sequence[Template]) -> Penalty:

@@ -18,10 +18,9 @@ from mlnlite.learn.learned import How, LearnedModel, Objective
 from mlnlite.learn.objectives.choose import Search, solved, task_of
 from mlnlite.learn.optimise.problem import Problem, log_likelihood
 from mlnlite.learn.optimise.solve import BOUND, GRADIENT, Solution
-from mlnlite.learn.prior import PRIOR_SD, Prior, prior_of
+from mlnlite.learn.prior import PRIOR_SD, Prior, prior_of, verify_prior
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
-from mlnlite.model.symbols import Type
 
 
 def learn(  # noqa: PLR0913
@@ -65,18 +64,19 @@ def learn(  # noqa: PLR0913
         EvidenceMistake: if a block that must have a value has none, or facts have probabilities.
     """
     deadline, prior, start = in_seconds(time_limit), prior_of(prior), monotonic()
-    how = _how(model, databases, objective, (predict, open_predicates), tied, database_weights)
+    how = how_of(model, databases, objective, (predict, open_predicates), tied, database_weights)
+    verify_prior(prior, model.templates, how.objective)
     model = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
     with interruptible(deadline):
         task = task_of(model, databases, how, _names(model, how.predict, "predict"), engine)
         counted = monotonic()
         solution = solved(model, task, prior, Search(_start(model) if resume else None, seed, deadline))
-    learned = _learned(replace(model, types=_types(model, databases)), task.problem, solution)
+    learned = _learned(with_constants(model, databases), task.problem, solution)
     seconds = {"count": counted - start, "solve": monotonic() - counted}
     return replace(learned, prior=prior, objective=_title(how), how=how, seconds=seconds)
 
 
-def _how(
+def how_of(
     model: Model,
     databases: Evidence,
     objective: str | None,
@@ -130,10 +130,10 @@ def _objective(
     return chosen
 
 
-def _types(model: Model, databases: Evidence) -> dict[str, Type]:
-    """The types of the learnt model: the constants of the databases come in where there is a weight for each."""
+def with_constants(model: Model, databases: Evidence) -> Model:
+    """A model with the types of the learnt one: the databases' constants come in where there is a weight for each."""
     keys = {t.formula.variables[k].type for t in model.templates for k in t.keys}
-    return {name: databases.types[name] if name in keys else t for name, t in model.types.items()}
+    return replace(model, types={n: databases.types[n] if n in keys else t for n, t in model.types.items()})
 
 
 def _names(model: Model, given: Iterable[str] | None, what: str) -> frozenset[str]:

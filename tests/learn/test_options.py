@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from click.testing import CliRunner
 
 import mlnlite as ml
 from mlnlite.cli import mlnlite as command
+from mlnlite.learn import weights
 from mlnlite.learn.optimise.problem import log_likelihood
+from mlnlite.learn.trust import verify
 
 TEXT = "S(p)\nC(p)\nG(p, k!)\nk = {K1, K2}\nS(x) => C(x)\nC(x)\nS(x)\nS(x) ^ G(x, +k)\nC(x) ^ G(x, +k)\n"
 FIRST = "S(A)\nS(B)\nC(A)\nC(D)\nG(A, K1)\nG(B, K2)\nG(D, K1)"
@@ -105,8 +108,8 @@ def test_the_path_of_laplace_priors():
     assert path.n_nonzero[0] == 0
     assert path.n_nonzero[-1] > 4
     assert (np.diff(path.values) > -1e-9).all()
-    for scale, weights in zip(path.scales[[5, 12]], path.weights[[5, 12]], strict=True):
-        assert weights == pytest.approx(ml.learn(model, data, prior=ml.Laplace(scale)).weights, abs=1e-4)
+    for scale, found in zip(path.scales[[5, 12]], path.weights[[5, 12]], strict=True):
+        assert found == pytest.approx(ml.learn(model, data, prior=ml.Laplace(scale)).weights, abs=1e-4)
 
 
 def test_all_from_the_command(tmp_path):
@@ -141,3 +144,51 @@ def test_wrong_options(tmp_path, wrong):
     result = CliRunner().invoke(command, ["learn", str(tmp_path / "m.mln"), str(tmp_path / "a.db"), *wrong])
     assert result.exit_code == 2
     assert "takes" in result.output
+
+
+ALONE = "S(p)\np = {A, B, C}\nS(x) ^ S(y)\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--report", "sandwich"), "two independent clusters"),
+        (("--report", "information", "--objective", "max-margin"), "no likelihood"),
+        (("--laplace-path", "path.csv", "--objective", "max-margin"), "no likelihood"),
+        (("--laplace-path", "nowhere/path.csv"), "no folder"),
+        (("--held-out", "other.db"), "T is not declared"),
+        (("--held-out", "none.db"), "no file"),
+        (("--objective", "max-margin", "--prior", "hierarchical"), "Gaussian prior"),
+        (("--prior-of", "formula 9: laplace"), "formula 9"),
+        (("--prior-of", "formula 1: laplace 0"), "positive"),
+        (("--prior-sd", "inf"), "--prior none"),
+        (("--tie", "formula 1; formula 9"), "formula 9"),
+        (("--seed", "-1"), "--seed"),
+    ],
+)
+def test_what_cannot_be_had_is_refused_before_learning(tmp_path, monkeypatch, options, message):
+    """Nothing is learnt, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(weights, "solved", lambda *_: pytest.fail("it was learnt all the same"))
+    Path("m.mln").write_text(ALONE)
+    Path("a.db").write_text("S(A)")
+    Path("other.db").write_text("T(A)")
+    result = CliRunner().invoke(command, ["learn", "m.mln", "a.db", "-o", "out.mln", *options])
+    assert result.exit_code == 2, result.output
+    assert message in result.output
+    assert {path.name for path in tmp_path.iterdir()} == {"m.mln", "a.db", "other.db"}
+
+
+def test_a_path_that_would_have_to_be_sampled_is_refused_before_learning(tmp_path, monkeypatch):
+    def too_wide(*_):
+        raise ml.LimitReached("too wide")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(verify, "log_likelihood", too_wide)
+    Path("m.mln").write_text(ALONE)
+    Path("a.db").write_text("S(A)")
+    words = ["learn", "m.mln", "a.db", "-o", "out.mln", "--objective", "likelihood", "--laplace-path", "path.csv"]
+    result = CliRunner().invoke(command, words)
+    assert result.exit_code == 2
+    assert "not sampled" in result.output
+    assert not Path("out.mln").exists()

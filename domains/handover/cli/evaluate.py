@@ -16,7 +16,7 @@ from mlnlite.domains.handover.cli.options import COUNT
 )
 @click.option("--splits", default=200, type=COUNT, show_default=True, help="Repetitions of the paper's protocol.")
 @click.option("--data", type=click.Path(file_okay=False), help="Folder with the authors' files, handover/dataset.db.")
-@click.option("--seed", default=0, show_default=True, help="Of instances, splits, folds.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of instances, splits, folds.")
 @click.option("--workers", default=2, type=COUNT, show_default=True, help="Processes.")
 @click.option("--quality/--no-quality", default=True, show_default=True, help="Also the quality of handovers.")
 def evaluate(out: str, splits: int, data: str | None, seed: int, workers: int, quality: bool) -> None:

@@ -18,7 +18,9 @@ from mlnlite.domains.handover.cli.options import COUNT, OutFile
 @click.option("--model", type=click.Path(dir_okay=False), help="A learnt model that chooses the method; else ours.")
 @click.option("--script", default="drift", show_default=True, help="still, drift, nervous, lunge or withdraw.")
 @click.option("--track", type=click.Path(dir_okay=False), help="A recorded track of hand and face (JSON).")
-@click.option("--seed", default=0, show_default=True, help="Of noise, loss of sight and the script.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of noise, loss of sight and the script."
+)
 @click.option("--log", type=OutFile(), help="Write the run as JSON lines, or as .parquet.")
 @click.option(
     "--replay", type=OutFile((".html", ".viser")), help="Write the run as a page to play, .html, or as .viser."

@@ -13,7 +13,7 @@ from mlnlite.domains.handover.cli.options import COUNT, SOLVERS, OutFile
 
 _LABELS = click.option("--labels", default="sampled", show_default=True,
                        help="sampled from the study's preferences, or what is preferred.")  # fmt: skip
-_SEED = click.option("--seed", default=0, show_default=True, help="Of every draw.")
+_SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of every draw.")
 _CATALOGUE = click.option("--catalogue", type=click.Path(dir_okay=False), help="A TOML file of your own objects.")
 
 

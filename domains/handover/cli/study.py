@@ -11,7 +11,7 @@ from mlnlite.domains.handover import load
 
 @click.command()
 @click.option("--data", type=click.Path(dir_okay=False), help="A survey file (CSV); by default one is simulated.")
-@click.option("--seed", default=0, show_default=True, help="Of the simulation.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the simulation.")
 @click.option("--out", "-o", type=click.Path(file_okay=False), help="Folder for study.md, its figures and survey.csv.")
 def study(data: str | None, seed: int, out: str | None) -> None:
     """Analyse a user study: preferences, ratings, ranks, open answers."""

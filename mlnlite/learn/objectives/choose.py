@@ -219,11 +219,6 @@ def _widest(task: Task, penalty: Penalty, search: Search) -> Solution:
 
     problem = task.problem
     own = penalty.of(problem.free)
-    if not (own.precision > 0).all() or own.l1.any() or own.cauchy.any():
-        raise QueryMistake(
-            "max-margin learning needs a Gaussian prior of each weight",
-            "its standard deviation, squared, is the usual C",
-        )
     found = widest(list(task.labelled), own, problem.share, problem.weights, search.seed, search.deadline)
     optimum = Optimum(found.x, -found.slack, found.gap, found.cuts, found.status, ())
     return Solution(optimum, np.zeros(len(found.x), np.int8), penalty, None, "gap to the best")

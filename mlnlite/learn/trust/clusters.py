@@ -11,7 +11,7 @@ from mlnlite.ground.ground import ground
 from mlnlite.ground.network import Network
 from mlnlite.learn.data.merge import Listed, merged
 from mlnlite.learn.data.worlds import components
-from mlnlite.learn.learned import LearnedModel
+from mlnlite.learn.learned import How
 from mlnlite.learn.objectives.choose import pseudo_listed, tied_of, worth_of
 from mlnlite.learn.objectives.exact import compiled, conditions
 from mlnlite.learn.objectives.quantified import without_weights
@@ -25,23 +25,27 @@ ENOUGH = 10
 """Databases from which on they are the clusters; with fewer, their components are."""
 
 
-def clustered(learned: LearnedModel, databases: Evidence) -> tuple[Problem, int]:
+def clustered(model: Model, databases: Evidence, how: How) -> tuple[Problem, int]:
     """The problem with the choices of different clusters kept apart, and the number of clusters.
 
     Clusters are the databases, or, if there are few, the connected components of their networks.
+
+    Args:
+        model: expanded; its weights do not matter.
+        databases: the data.
+        how: what is learnt.
     """
-    model = learned.model
-    targets = frozenset(model.predicates if learned.how.predict is None else learned.how.predict)
-    n_weights = len(learned.weights)
-    tied, worth = tied_of(model, learned.how.tied), worth_of(databases, learned.how.database_weights)
+    targets = frozenset(model.predicates if how.predict is None else how.predict)
+    n_weights = sum(len(t.weights) for t in model.templates)
+    tied, worth = tied_of(model, how.tied), worth_of(databases, how.database_weights)
     apart = databases.n_databases < ENOUGH
-    if learned.how.objective == "pseudo-likelihood":
+    if how.objective == "pseudo-likelihood":
         parts = pseudo_listed(model, databases, targets, None)
         groups = _component_groups(model, databases, targets, parts) if apart else [p.database for p in parts]
         found = problem_of(model, merged(parts, n_weights, groups, worth), tied=tied)
         return found, len(np.unique(found.every.group))
-    unknown = frozenset(learned.how.open_predicates)
-    exact = compiled(without_weights(model), databases, targets, unknown, learned.how.objective)
+    unknown = frozenset(how.open_predicates)
+    exact = compiled(without_weights(model), databases, targets, unknown, how.objective)
     every = merged(exact.every, n_weights, _part_groups(exact.every, apart), worth)
     known = merged(exact.known, n_weights, _part_groups(exact.known, apart), worth)
     times = np.ones(databases.n_databases) if worth is None else worth

@@ -11,13 +11,14 @@ from scipy import sparse
 from mlnlite.errors import LimitReached, QueryMistake
 from mlnlite.learn.data.merge import Choices
 from mlnlite.learn.data.missing import is_incomplete
-from mlnlite.learn.learned import LearnedModel, Objective
+from mlnlite.learn.learned import How, LearnedModel, Objective
 from mlnlite.learn.objectives.choose import task_of
 from mlnlite.learn.optimise import information
 from mlnlite.learn.optimise.problem import Problem, log_likelihood
 from mlnlite.learn.optimise.solve import best
 from mlnlite.learn.trust.advice import formula_of
 from mlnlite.model.evidence import Evidence
+from mlnlite.model.model import Model
 
 Float = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -118,13 +119,13 @@ def _bend(found: Choices, x: Float, column: int) -> tuple[Float, float]:
     return np.asarray(information.hessian(found, x).todense(), float), slope
 
 
-def has_unknown(learned: LearnedModel, databases: Evidence) -> bool:
+def has_unknown(model: Model, databases: Evidence, how: How) -> bool:
     """Whether databases leave atoms unknown that matter to a learnt model."""
-    return bool(learned.how.open_predicates) or is_incomplete(learned.model, databases, _targets(learned))
+    return bool(how.open_predicates) or is_incomplete(model, databases, _targets(model, how))
 
 
-def _targets(learned: LearnedModel) -> frozenset[str]:
-    return frozenset(learned.model.predicates if learned.how.predict is None else learned.how.predict)
+def _targets(model: Model, how: How) -> frozenset[str]:
+    return frozenset(model.predicates if how.predict is None else how.predict)
 
 
 def held_out(learned: LearnedModel, databases: Evidence) -> float:
@@ -139,11 +140,14 @@ def held_out(learned: LearnedModel, databases: Evidence) -> float:
     Raises:
         LimitReached: if atoms are unknown, and components too wide for an exact likelihood.
     """
-    model, targets = learned.model, _targets(learned)
-    model = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
-    free = replace(model, templates=tuple(replace(t, fixed=t.hard) for t in model.templates))
-    objective: Objective = "likelihood" if has_unknown(learned, databases) else "pseudo-likelihood"
-    how = replace(learned.how, objective=objective, tied=(), database_weights=None)
-    problem = task_of(free, databases, how, targets, None).problem
-    weights = np.concatenate([np.empty(0), *(t.weights for t in model.templates)])
+    problem = unseen(learned.model, databases, learned.how)
+    weights = np.concatenate([np.empty(0), *(t.expanded(databases.types).weights for t in learned.model.templates)])
     return log_likelihood(problem, weights[problem.free])[0] / max(1, problem.every.n_choices)
+
+
+def unseen(model: Model, databases: Evidence, how: How) -> Problem:
+    """The likelihood of databases that a model has not seen, with all weights free that are not hard."""
+    objective: Objective = "likelihood" if has_unknown(model, databases, how) else "pseudo-likelihood"
+    how = replace(how, objective=objective, tied=(), database_weights=None)
+    free = (replace(t.expanded(databases.types), fixed=t.hard) for t in model.templates)
+    return task_of(replace(model, templates=tuple(free)), databases, how, _targets(model, how), None).problem

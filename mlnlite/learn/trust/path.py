@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import QueryMistake
-from mlnlite.learn.learned import LearnedModel
+from mlnlite.learn.learned import How, LearnedModel
 from mlnlite.learn.optimise.problem import log_likelihood
 from mlnlite.learn.optimise.solve import best
 from mlnlite.learn.trust.advice import formula_of
@@ -38,6 +38,14 @@ class LaplacePath:
         return np.asarray(np.count_nonzero(self.weights, axis=1))
 
 
+def verify_path(how: How, sampled: bool) -> None:
+    """Complains of what has no path of Laplace priors."""
+    if how.objective == "max-margin":
+        raise QueryMistake("max-margin weights have no likelihood whose path under Laplace priors could be followed")
+    if sampled:
+        raise QueryMistake("the path of Laplace priors needs a likelihood that is worked out, not sampled")
+
+
 def laplace_path(learned: LearnedModel, points: int = 50, longest: float = 1e3) -> LaplacePath:
     """The best weights under Laplace priors from the scale at which the first formula comes in.
 
@@ -52,8 +60,7 @@ def laplace_path(learned: LearnedModel, points: int = 50, longest: float = 1e3) 
         QueryMistake: if the likelihood was sampled.
     """
     problem, k = learned.problem, len(learned.problem.free)
-    if learned.monte_carlo.any() or learned.how.objective == "max-margin":
-        raise QueryMistake("the path of Laplace priors needs a likelihood that is worked out, not sampled")
+    verify_path(learned.how, bool(learned.monte_carlo.any()))
     x, none = np.zeros(k), np.zeros(k)
     steepest = float(np.abs(log_likelihood(problem, x)[1]).max(initial=1e-300))
     scales = np.geomspace(1.0, longest, points) / steepest

@@ -18,7 +18,7 @@ from scipy.stats import norm, t
 from mlnlite.errors import QueryMistake
 from mlnlite.learn.data.wide import wide_slopes
 from mlnlite.learn.data.worlds import MOST_WORLDS
-from mlnlite.learn.learned import LearnedModel
+from mlnlite.learn.learned import How, LearnedModel
 from mlnlite.learn.objectives.sampled import sampled_scores
 from mlnlite.learn.optimise import information
 from mlnlite.learn.optimise.problem import Problem
@@ -90,16 +90,14 @@ def uncertainty(
         QueryMistake: if the level is not between 0 and 1, there are fewer than two clusters, or the weights were not
             learnt from a likelihood.
     """
-    if learned.how.objective == "max-margin" and method != "bootstrap":
-        raise QueryMistake("max-margin weights have no likelihood to tell their errors", "ask for the bootstrap")
+    verify_method(learned.how, method)
     if not 0 < level < 1:
         raise QueryMistake(f"the level of an interval is between 0 and 1, found {level:g}")
     if method == "bootstrap":
         return _bootstrap(learned, databases, level, repetitions, seed)
-    grouped, n_clusters = clustered(learned, databases)
-    if method == "sandwich" and n_clusters < 2:
-        hint = 'say method="bootstrap" or "information", or give several databases'
-        raise QueryMistake("a sandwich needs at least two independent clusters of data, found one", hint)
+    grouped, n_clusters = clustered(learned.model, databases, learned.how)
+    if method == "sandwich":
+        verify_clusters(n_clusters)
     covariance = _covariance(learned, grouped, method)
     few = f"only {n_clusters} independent clusters: these standard errors are rough; compare the bootstrap"
     warnings = (few,) if method == "sandwich" and n_clusters < FEW else ()
@@ -109,6 +107,19 @@ def uncertainty(
     low, high = weights - quantile * sd, weights + quantile * sd
     clusters = n_clusters if method == "sandwich" else 0
     return Uncertainty(sd, low, high, level, method, clusters, covariance, warnings)
+
+
+def verify_method(how: How, method: Method) -> None:
+    """Complains of a method that does not fit what was learnt."""
+    if how.objective == "max-margin" and method != "bootstrap":
+        raise QueryMistake("max-margin weights have no likelihood to tell their errors", "ask for the bootstrap")
+
+
+def verify_clusters(n_clusters: int) -> None:
+    """Complains of too few clusters for a sandwich."""
+    if n_clusters < 2:
+        hint = 'say method="bootstrap" or "information" (`--report bootstrap`), or give several databases'
+        raise QueryMistake(f"a sandwich needs at least two independent clusters of data, found {n_clusters}", hint)
 
 
 def _sd(covariance: sparse.csr_array, learned: LearnedModel) -> Float:
