@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mlnlite.model.model import Model
-from mlnlite.model.unparse import row_text
+from mlnlite.model.unparse import row_formula, template_formula
 from mlnlite.syntax import tree
 from mlnlite.syntax.lower import parts
-from mlnlite.syntax.queries import parse_atom_query
 from mlnlite.syntax.walk import map_terms, variables_of
 from mlnlite.syntax.write import write_formula
 
@@ -26,7 +25,8 @@ class Difference:
 def differences(left: Model, right: Model, *, tolerance: float = 0.0) -> list[Difference]:
     """The formulas that only one model has, or whose weights differ by more than `tolerance`.
 
-    Formulas are the same if they read the same with variables renamed in order of appearance.
+    Formulas are the same if they read the same with variables renamed in order of appearance and `!a v b` written as
+    `a => b`.
     """
     tables = [dict(_rows(model)) for model in (left, right)]
     found = []
@@ -52,27 +52,27 @@ def _rows(model: Model) -> Iterator[tuple[str, float]]:
     """The formula and weight of each row; equal formulas add their weights, as they do in the distribution."""
     sums: dict[str, float] = {}
     for template in model.templates:
-        named = renamed(model, template.text)
-        if template.rows is None or not template.keys:
-            sums[named] = sums.get(named, 0.0) + float(template.weights[0])
-            continue
+        by_row = template.rows is not None and template.keys
+        text = renamed(template_formula(template, model))
         for row, weight in enumerate(template.weights.tolist()):
-            text = row_text(template, model, row)
+            text = renamed(row_formula(template, model, row)) if by_row else text
             sums[text] = sums.get(text, 0.0) + weight
     yield from sums.items()
 
 
-def renamed(model: Model, text: str) -> str:
-    """The text of a formula with its variables called x1, x2, ... in order of appearance."""
-    formula = parse_atom_query(text, model.dialect)
+def renamed(formula: tree.Formula) -> str:
+    """The text of a formula with its free variables called x1, x2, ... in order of appearance."""
     bound = set(_bound(formula))
+    plus = {v.name for v in variables_of(formula) if v.plus}
     names: dict[str, str] = {}
     for variable in variables_of(formula):
         if variable.name not in bound:
             names.setdefault(variable.name, f"x{len(names) + 1}")
 
     def change(term: tree.Term) -> tree.Term:
-        return tree.Variable(names.get(term.name, term.name), term.plus) if isinstance(term, tree.Variable) else term
+        if not isinstance(term, tree.Variable):
+            return term
+        return tree.Variable(names.get(term.name, term.name), term.name in plus)
 
     return write_formula(map_terms(formula, change), "standard")
 

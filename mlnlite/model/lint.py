@@ -10,6 +10,7 @@ from mlnlite.model.compare import renamed
 from mlnlite.model.model import Model
 from mlnlite.model.propositional import cubes
 from mlnlite.model.templates import Template
+from mlnlite.model.unparse import template_formula
 from mlnlite.source import Span
 from mlnlite.syntax import tree
 from mlnlite.syntax.lower import parts
@@ -104,11 +105,21 @@ def _twice(model: Model, program: tree.Program) -> Iterator[Diagnostic]:
     """Formulas that say the same up to names of variables."""
     seen: dict[str, Template] = {}
     for template in model.templates:
-        other = seen.setdefault(renamed(model, template.text), template)
+        yield from _same_rows(template)
+        other = seen.setdefault(renamed(template_formula(template, model)), template)
         if other is not template:
             place = f" at {other.span.place}" if other.span else ""
             message = f"{template.name} says the same as {other.name}{place}: {template.text}"
             yield _warning("W209", message, template.span, "their weights add; keep one with the sum")
+
+
+def _same_rows(template: Template) -> Iterator[Diagnostic]:
+    seen: dict[tuple[int, ...], Span] = {}
+    for row, span in zip([] if template.rows is None else template.rows.tolist(), template.row_spans, strict=False):
+        other = seen.setdefault(tuple(row), span)
+        if other is not span:
+            message = f"this says the same as the formula at {other.place}"
+            yield _warning("W209", message, span, "their weights add; keep one with the sum")
 
 
 def _one_constant(model: Model, program: tree.Program) -> Iterator[Diagnostic]:

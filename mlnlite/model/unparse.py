@@ -38,6 +38,16 @@ def program_of(model: Model) -> tree.Program:
 
 def row_text(template: Template, model: Model, row: int) -> str:
     """One formula of a template, as text: its row number `row`."""
+    return write_formula(row_formula(template, model, row), model.dialect)
+
+
+def template_formula(template: Template, model: Model) -> tree.Formula:
+    """The formula of a template, its keys as variables with `+`."""
+    return _Untyper(template, model, None).formula()
+
+
+def row_formula(template: Template, model: Model, row: int) -> tree.Formula:
+    """One formula of a template: its row number `row`."""
     assert template.rows is not None
     holes: list[int] = []
     formula = _Untyper(template, model, holes).formula()
@@ -45,18 +55,19 @@ def row_text(template: Template, model: Model, row: int) -> str:
     for key in holes:
         type_name = template.formula.variables[template.keys[key]].type
         constants.append(tree.Constant(model.types[type_name].constants[template.rows[row, key]]))
-    return write_formula(_filled(formula, constants), model.dialect)
+    return _filled(formula, constants)
 
 
 def _statements(template: Template, model: Model) -> Iterator[tree.Statement]:
-    if template.rows is None or not template.keys:
+    if template.rows is None:
         yield _statement(template, model)
         return
     holes: list[int] = []
     formula = _Untyper(template, model, holes).formula()
     names = [np.array(model.types[template.formula.variables[k].type].constants, object) for k in template.keys]
     columns = tuple(tuple(names[k][template.rows[:, k]].tolist()) for k in holes)
-    if template.hard or template.fixed or len(template.weights) == 1 or np.isnan(template.weights).any():
+    one_by_one = template.hard or template.fixed or not template.keys or len(template.weights) == 1
+    if one_by_one or np.isnan(template.weights).any():
         yield from _row_by_row(template, formula, columns)
     else:
         weights = tuple(tree.Number(w) for w in template.weights.tolist())
@@ -66,7 +77,7 @@ def _statements(template: Template, model: Model) -> Iterator[tree.Statement]:
 def _statement(template: Template, model: Model) -> tree.FormulaStatement:
     names = [template.formula.variables[k].name for k in template.keys]
     unique = tuple(tuple(names[i] for i in group) for group in template.unique)
-    formula = _Untyper(template, model, None).formula()
+    formula = template_formula(template, model)
     if template.number is not None:
         weight = tree.NumberOf(names[template.number])
         return tree.FormulaStatement(formula, weight, fixed=True)
@@ -152,7 +163,7 @@ class _Untyper:
         inside = self._expression(body)
         if high is None or low == high:
             return tree.Count(names, inside, ">=" if high is None else "=", low)
-        return tree.Count(names, inside, "<=", high)
+        return tree.Count(names, inside, "<", high + 1) if high < 0 else tree.Count(names, inside, "<=", high)
 
     def _quantified(self, quantifier: str, variables: tuple[int, ...], body: typed.Expression) -> tree.Formula:
         names = tuple(self.template.formula.variables[v].name for v in variables)

@@ -123,7 +123,7 @@ def _both(place: Place, span: Span, children: Children) -> raw.Both:
 
 
 def _group(place: Place, span: Span, children: Children) -> raw.Group:
-    names = tuple(str(c) for c in children if getattr(c, "type", "") == "NAME")
+    names = tuple(name.strip() for name in str(children[0]).split("|"))
     return raw.Group(names, tuple(_nodes(children)), span)
 
 

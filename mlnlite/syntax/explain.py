@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from mlnlite.errors import Diagnostic
 from mlnlite.source import Span
-from mlnlite.syntax.foreign import CONSTRUCTS, foreign_operator
+from mlnlite.syntax.foreign import CONSTRUCTS, OURS, foreign_operator
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Language, Place
 
@@ -140,8 +140,11 @@ def _construct(failure: Failure) -> Diagnostic | None:
         if failure.language == "evidence" and name.endswith("formula"):
             continue
         for match in pattern.finditer(failure.text):
-            if match.start() <= failure.at < match.end():
-                return mistake("E110", failure.span(match.start(), match.end()), advice, construct=name)
+            if not match.start() <= failure.at < match.end():
+                continue
+            if failure.language in ("standard", "prac") and name in OURS:
+                return mistake("E144", failure.span(match.start(), match.end()), OURS[name], construct=name)
+            return mistake("E110", failure.span(match.start(), match.end()), advice, construct=name)
     return None
 
 

@@ -64,3 +64,13 @@ CONSTRUCTS: tuple[tuple[re.Pattern[str], str, str], ...] = tuple(
         (r"[\[{]", "this kind of bracket in a formula", "use ( and )"),
     )
 )
+
+OURS = {
+    "`count(...)`": "write `count(P(x) | x) <= 2`: a formula, `|`, variables, a comparison, a whole number",
+    "`domSize(...)`": "it is part of a weight: `log(domSize(person)) P(x)`",
+    "a macro (`$name`)": "it is part of a weight, as in `$w P(x)` or `2 * $w P(x)`",
+    "a group of predicates (`p|q(...)`)": "write `P|Q(x)`: names of predicates, then their arguments",
+    "`*P(...)` inside a formula": "write `*P(x) ^ Q(x)`: the star stands before a predicate",
+    "a range of constants (`...`)": "it stands between two whole numbers of a type: `year = {1, ..., 12}`",
+}
+"""Those that our dialects have, and how they are written."""

@@ -52,6 +52,7 @@ MESSAGES: dict[str, str] = {
     "E141": "a second fact on the same line, starting at {found}",
     "E142": "a formula where a fact was expected: found {found} after the fact",
     "E143": "a fact does not end with a dot",
+    "E144": "{construct} is not written like this, or does not stand here",
     "E145": "a fact cannot be both left open (`?`) and false (`!`)",
     "E146": "`{found}` is a variable, but every argument of a fact is a constant",
     "E147": "databases are separated by exactly three dashes alone on a line, found `{found}`",

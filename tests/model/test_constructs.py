@@ -151,10 +151,18 @@ def test_size_of_a_type():
 
 
 @pytest.mark.parametrize(
-    "formula", ["1 P(t) ^ t < 3", "c: Conf(t, c) => P(t)", "1 count(P(t) | t) = 2", "1 P(+t) ^ t > 2"]
+    "formula",
+    [
+        "1 P(t) ^ t < 3",
+        "c: Conf(t, c) => P(t)",
+        "1 count(P(t) | t) = 2",
+        "1 count(P(t) | t) < 0 v Rain",
+        "1 count(P(t) ^ Rain | t) >= 2",
+        "1 P(+t) ^ t > 2",
+    ],
 )
 def test_text_of_a_model(formula):
-    text = "time = {1, ..., 3}\nP(time)\nConf(time, num)\nnum = {0.5, 1.5}\n" + formula
+    text = "time = {1, ..., 3}\nP(time)\nRain\nConf(time, num)\nnum = {0.5, 1.5}\n" + formula
     model = ml.model_from_text(text)
     assert ml.model_text(ml.model_from_text(ml.model_text(model))) == ml.model_text(model)
     again = ml.model_from_text(ml.model_text(model))

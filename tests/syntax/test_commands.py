@@ -118,6 +118,14 @@ def test_lint(tmp_path, code):
     assert all(d["hint"] for d in json.loads(output)[-1:])
 
 
+def test_lint_of_a_repeated_formula(tmp_path):
+    path = tmp_path / "m.mln"
+    path.write_text("S(p)\nC(p)\n1 S(x) => C(x)\n2 S(x) => C(x)\n1 S(A)\n1 S(B)\n")
+    status, output = run("lint", "--format", "json", path)
+    (warning,) = json.loads(output)
+    assert (status, warning["code"], warning["line"]) == (1, "W209", 4)
+
+
 def test_lint_of_a_good_model(model):
     assert run("lint", model) == (0, "nothing to warn of\n")
 
