@@ -58,10 +58,14 @@ def run_plan(plan, stored):
         case Compute(source, name, terms, constant):
             rows = run_plan(source, stored)
             return [{**r, name: constant + sum(factor * r[c] for c, factor in terms)} for r in rows]
-        case Lookup(source, table, key, name, default):
+        case Lookup(source, table, key, name, default, dropped):
             known = {row[:-1]: row[-1] for row in stored[table]}
-            rows = run_plan(source, stored)
-            return [{**r, name: known.get(tuple(_value(r, k) for k in key), _value(r, default))} for r in rows]
+            found = [(r, known.get(tuple(_value(r, k) for k in key))) for r in run_plan(source, stored)]
+            return [
+                {**r, name: _value(r, default) if value is None else value}
+                for r, value in found
+                if value is None or value != dropped
+            ]
         case Project(source, columns):
             return [{c: r[c] for c in columns} for r in run_plan(source, stored)]
         case Union(sources):

@@ -6,7 +6,7 @@ columns independent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from math import prod
@@ -55,6 +55,10 @@ class Estimate:
         distinct = {c: min(d, max(rows, 1.0)) for c, d in self.distinct.items()}
         return Estimate(rows, distinct, max(self.widest, rows))
 
+    def with_column(self, name: str) -> Estimate:
+        """One more column, with a value of its own in each row."""
+        return Estimate(self.rows, {**self.distinct, name: self.rows}, self.widest)
+
 
 def estimate(plan: Plan, tables: Tables) -> Estimate:
     """The estimate for a plan."""
@@ -84,15 +88,19 @@ def _estimate(plan: Plan, tables: Tables, n_distinct: Callable[[str, int], float
         case Join(left, right):
             return _join(inside(left), inside(right))
         case AntiJoin(left, right):
-            return _antijoin(inside(left), inside(right))
+            others = inside(right)
+            return _antijoin(inside(left), others.rows, others.distinct)
         case Where(source, left_side, operator, right_side):
             below = inside(source)
             sides = [below.distinct.get(s, 1.0) for s in (left_side, right_side) if isinstance(s, str)]
             equal = 1.0 / max([1.0, *sides])
             return below.resized(below.rows * (equal if operator == "=" else 1.0 - equal))
-        case Compute(source, name) | Lookup(source, name=name):
+        case Compute(source, name):
+            return inside(source).with_column(name)
+        case Lookup(source, table, key, name, _, dropped):
+            n_dropped = 0 if dropped is None else int(np.count_nonzero(tables[table][-1] == dropped))
             below = inside(source)
-            return Estimate(below.rows, {**below.distinct, name: below.rows}, below.widest)
+            return _antijoin(below, n_dropped, [k for k in key if isinstance(k, str)]).with_column(name)
         case Project(source, columns):
             below = inside(source)
             return Estimate(below.rows, {c: below.distinct[c] for c in columns}, below.widest)
@@ -131,7 +139,7 @@ def _join(left: Estimate, right: Estimate) -> Estimate:
     return Estimate(rows, distinct, max(left.widest, right.widest)).resized(rows)
 
 
-def _antijoin(left: Estimate, right: Estimate) -> Estimate:
-    possible = prod([left.distinct.get(c, 1.0) for c in right.distinct])
-    hit = min(0.9, right.rows / max(possible, 1.0))
+def _antijoin(left: Estimate, n_others: float, by: Iterable[str]) -> Estimate:
+    possible = prod([left.distinct.get(c, 1.0) for c in by])
+    hit = min(0.9, n_others / max(possible, 1.0))
     return left.resized(left.rows * (1.0 - hit))

@@ -100,7 +100,8 @@ def packing_of(columns: Sequence[Column]) -> Packing:
 def _within(column: Column, digit: Digit) -> tuple[Column, Bool | None]:
     """A column from its lowest value on, and which values are outside of the digit (they become 0); None if none is."""
     low, end = digit.low, digit.low + digit.width
-    if not len(column) or (int(column.min()) >= low and int(column.max()) < end):
+    every = column[:1] if column.strides == (0,) else column  # of a constant one is enough
+    if not len(column) or (int(every.min()) >= low and int(every.max()) < end):
         return column - low if low else column, None
     outside = (column < low) | (column >= end)
     return np.where(outside, 0, column - low), outside

@@ -64,17 +64,18 @@ class NumpyEngine:
 
         def run(plan: Plan) -> Relation:
             rows = _run(plan, store)
-            return {c: rows.columns[c] for c in columns_of(plan)}
+            return _Rows({c: rows.columns[c] for c in columns_of(plan)}, rows.n, rows.mask).whole().columns
 
         return run
 
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """A relation: columns of integers of length `n`."""
+    """A relation: columns of integers of length `n`, of which the rows of a mask count; None for all."""
 
     columns: dict[str, Column]
     n: int
+    mask: Bool | None = None
 
     def take(self, index: Int64 | None) -> _Rows:
         """Some of the rows; None for all."""
@@ -83,8 +84,21 @@ class _Rows:
         return _Rows({name: c.take(index, mode="clip") for name, c in self.columns.items()}, len(index))
 
     def keep(self, mask: Bool) -> _Rows:
-        """The rows of a mask."""
-        return self if mask.all() else self.take(np.flatnonzero(mask))
+        """The rows of a mask. As long as these are most, the others stay, for fewer copies."""
+        mask = mask if self.mask is None else self.mask & mask
+        n = np.count_nonzero(mask)
+        if n == self.n:
+            return self
+        rows = _Rows(self.columns, self.n, mask)
+        return rows if 2 * n > self.n else rows.whole()
+
+    def with_column(self, name: str, values: Column) -> _Rows:
+        """The same with one more column."""
+        return _Rows({**self.columns, name: values}, self.n, self.mask)
+
+    def whole(self) -> _Rows:
+        """The same without other rows."""
+        return self if self.mask is None else self.take(np.flatnonzero(self.mask))
 
     def values(self, names: Sequence[str]) -> list[Column]:
         """Some of the columns."""
@@ -111,7 +125,7 @@ class _Store:
         """The numbers that a relation's rows with some columns have (None: 0), for other rows; and that of no row."""
         known = self.dictionaries.get((relation, by))
         if known is None:
-            rows = _run(relation, self)
+            rows = _run(relation, self).whole()
             rows = _Rows({**rows.columns, "": np.zeros(rows.n, np.int8) if values is None else values}, rows.n)
             few = _near(rows, by, others)
             known = dictionary([few.columns[c] for c in by], few.columns[""], len(others[0]))
@@ -129,7 +143,7 @@ def _run(plan: Plan, store: _Store) -> _Rows:
         case One():
             return _Rows({}, 1)
         case Join(left, right):
-            return _join(_run(left, store), _run(right, store), store.most)
+            return _join(_run(left, store).whole(), _run(right, store).whole(), store.most)
         case AntiJoin(left, right):
             return _antijoin(_run(left, store), right, store)
         case Where(source, left_side, operator, right_side):
@@ -141,11 +155,11 @@ def _run(plan: Plan, store: _Store) -> _Rows:
             return _lookup(plan, _run(plan.source, store), store)
         case Project(source, kept):
             rows = _run(source, store)
-            return _Rows({c: rows.columns[c] for c in kept}, rows.n)
+            return _Rows({c: rows.columns[c] for c in kept}, rows.n, rows.mask)
         case Union(sources):
-            return _union([_run(s, store) for s in sources], columns_of(plan))
+            return _union([_run(s, store).whole() for s in sources], columns_of(plan))
         case Count(source, by):
-            return _count(_run(source, store), by)
+            return _count(_run(source, store).whole(), by)
 
 
 def _scan(plan: Scan, tables: Tables) -> _Rows:
@@ -174,7 +188,7 @@ def _compute(plan: Compute, rows: _Rows) -> _Rows:
     parts = [c.astype(kind, copy=False) * kind(f) if f != 1 else c.astype(kind, copy=False) for c, f in terms]
     if plan.constant or not parts:
         parts.append(np.broadcast_to(kind(plan.constant), rows.n))
-    return _Rows({**rows.columns, plan.name: sum(parts[1:], start=parts[0])}, rows.n)
+    return rows.with_column(plan.name, sum(parts[1:], start=parts[0]))
 
 
 def _largest(column: Column) -> int:
@@ -261,22 +275,24 @@ def _paired(left: _Rows, left_index: Int64 | None, right: _Rows, right_index: In
 def _antijoin(left: _Rows, right: Plan, store: _Store) -> _Rows:
     shared = tuple(c for c in columns_of(right) if c in left.columns)
     if not shared:
-        return left if _run(right, store).n == 0 else left.take(np.empty(0, np.int64))
+        return left if _run(right, store).whole().n == 0 else left.take(np.empty(0, np.int64))
     found, absent = store.look_up(right, shared, None, [left.columns[c] for c in shared])
     return left.keep(found == absent)
 
 
 def _lookup(plan: Lookup, rows: _Rows, store: _Store) -> _Rows:
     value = store.tables[plan.table][-1]
-    default = rows.value(plan.default)
     if not len(value):
-        return _Rows({**rows.columns, plan.name: np.array(default)}, rows.n)
+        return rows.with_column(plan.name, np.array(rows.value(plan.default)))
     if not plan.key:
-        return _Rows({**rows.columns, plan.name: np.full(rows.n, value[0], np.result_type(default, value))}, rows.n)
+        rows = rows.with_column(plan.name, np.full(rows.n, value[0]))
+        return rows if plan.dropped is None else rows.keep(rows.columns[plan.name] != plan.dropped)
     key = tuple(f"k{i}" for i in range(len(plan.key)))
     found, absent = store.look_up(Scan(plan.table, (*key, None)), key, value, [rows.value(k) for k in plan.key])
-    found = np.where(found == absent, default, found)
-    return _Rows({**rows.columns, plan.name: found}, rows.n)
+    if plan.dropped is not None:
+        rows = rows.with_column(plan.name, found).keep(found != plan.dropped)
+        found = rows.columns[plan.name]
+    return rows.with_column(plan.name, np.where(found == absent, rows.value(plan.default), found))
 
 
 def _union(sources: list[_Rows], columns: tuple[str, ...]) -> _Rows:

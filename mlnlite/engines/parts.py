@@ -10,7 +10,7 @@ from math import prod
 from mlnlite.engines.forecast import estimate
 from mlnlite.engines.plan import AntiJoin, Compute, Count, Join, Lookup, One, Plan, Project, Scan, Tables, Union, Where
 
-CHUNK = 1 << 18
+CHUNK = 1 << 17
 """Rows of a part, about."""
 
 
@@ -26,8 +26,8 @@ def in_parts(plan: Plan, tables: Tables, chunk: int = CHUNK) -> list[Plan]:
     if start is None or most_rows(plan, tables) <= 2 * chunk:
         return [plan]
     _, *others = _scans(plan)
-    widest = estimate(plan, tables).widest
     n_rows = _length(start, tables)
+    widest = estimate(plan, tables).widest if others else n_rows
     n = min(n_rows, int(widest / chunk) + 1)
     if n < 2 or n * sum(_length(s, tables) for s in others) > 2 * widest:
         return [plan]

@@ -79,7 +79,8 @@ class Lookup:
     """Adds a column `name` from a stored table.
 
     It is the last column of the table's row whose first columns are those of `key` (column names or numbers), or
-    `default` (a number, or another column) where there is no such row. The key is unique in the table.
+    `default` (a number, or another column) where there is no such row. The key is unique in the table. Rows whose
+    value in the table is `dropped` go.
     """
 
     source: Plan
@@ -87,6 +88,7 @@ class Lookup:
     key: tuple[str | int, ...]
     name: str
     default: int | str
+    dropped: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

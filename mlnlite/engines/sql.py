@@ -105,4 +105,5 @@ def _lookup(plan: Lookup) -> str:
     on = " AND ".join(f"t.c{i} = {'l.' + quoted(k) if isinstance(k, str) else k}" for i, k in enumerate(plan.key))
     value = f"COALESCE(t.c{len(plan.key)}, {_side(plan.default)}) AS {quoted(plan.name)}"
     columns = ", ".join([*(f"l.{quoted(c)}" for c in columns_of(plan.source)), value])
-    return f"SELECT {columns} FROM {_sub(plan.source, 'l')} LEFT JOIN {quoted(plan.table)} AS t ON {on or 'TRUE'}"
+    kept = "" if plan.dropped is None else f" WHERE t.c{len(plan.key)} IS DISTINCT FROM {plan.dropped}"
+    return f"SELECT {columns} FROM {_sub(plan.source, 'l')} LEFT JOIN {quoted(plan.table)} AS t ON {on or 'TRUE'}{kept}"

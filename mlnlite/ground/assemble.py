@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mlnlite.ground.blocks import Index, Piece, blocks_of
 from mlnlite.ground.compile import strides
 from mlnlite.ground.network import Network
+from mlnlite.ground.numbers import atoms_numbered, known_numbers, numbers_of
 from mlnlite.model.change import find
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
@@ -61,13 +62,16 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         query: numbers of further atoms that are to be in the network unless they are known.
     """
     asked = np.empty(0, np.int64) if query is None else unknown(np.unique(query), evidence)
-    touched = distinct([asked, *(a for part in parts for p in part.pieces for a in p.atoms)])
-    atoms, block = with_blocks(touched, evidence)
-    index = index_in(atoms)
+    known = [known_numbers(name, evidence) for name, p in evidence.predicates.items() if not p.closed]
+    listed = distinct(
+        [numbers_of(asked, evidence), *(a for part in parts for p in part.pieces for a in p.atoms)], known
+    )
+    atoms, block = with_blocks(atoms_numbered(listed, evidence), evidence)
+    index = index_in(numbers_of(atoms, evidence))
     variable, value, cardinality, is_block = variables_of(atoms, block, evidence)
     first = np.cumsum([0, *(len(part.decided_true) for part in parts)])
     pieces = [(p, offset) for part, offset in zip(parts, first.tolist(), strict=False) for p in part.pieces]
-    blocks = blocks_of(pieces, index, len(atoms), int(first[-1]))
+    blocks = blocks_of(pieces, index, len(atoms))
     network = Network(
         model=model,
         evidence=evidence,
@@ -99,17 +103,28 @@ DENSEST = 1 << 28
 """Atom numbers that a look-up table may span."""
 
 
-def distinct(numbers: Sequence[Int64]) -> Int64:
-    """All numbers of some arrays, each once, rising."""
-    flat = [n for n in numbers if n.size]
+def distinct(numbers: Sequence[Int64], others: Sequence[Int64] = ()) -> Int64:
+    """All numbers of some arrays, each once, rising.
+
+    Args:
+        numbers: arrays.
+        others: numbers that are in none of them: an array between whose bounds all others have been seen is left out.
+    """
+    flat = [(n, int(n.min()), int(n.max())) for n in numbers if n.size]
     if not flat:
         return np.empty(0, np.int64)
-    low, high = min(int(n.min()) for n in flat), max(int(n.max()) for n in flat)
-    if high - low >= min(DENSEST, 16 * sum(map(len, flat)) + 4096):
-        return np.unique(np.concatenate(flat))
+    low, high = min(first for _, first, _ in flat), max(last for _, _, last in flat)
+    if high - low >= min(DENSEST, 16 * sum(len(n) for n, _, _ in flat) + 4096):
+        return np.unique(np.concatenate([n for n, _, _ in flat]))
     seen = np.zeros(high - low + 1, np.bool_)
-    for n in flat:
-        seen[n - low if low else n] = True
+    never = [n[(n >= low) & (n <= high)] - low for n in others]
+    for n in never:
+        seen[n] = True
+    for n, first, last in sorted(flat, key=lambda item: len(item[0])):
+        if not seen[first - low : last - low + 1].all():
+            seen[n - low if low else n] = True
+    for n in never:
+        seen[n] = False
     return np.flatnonzero(seen) + low
 
 

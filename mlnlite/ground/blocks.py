@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite.ground.merge import Bounds, Factors, code_of, merged, merged_codes
+from mlnlite.ground.merge import Group, code_of, merged, merged_codes
 from mlnlite.ground.network import Clauses, Counts, Tables
 from mlnlite.ground.residual import ClauseShape, CountShape, TableShape
 from mlnlite.ground.states import counts_of
@@ -29,7 +30,7 @@ class Piece:
     """Ground formulas of one template that have one shape.
 
     Attributes:
-        atoms: for each of `shape.atoms` a column of atom numbers, shape (n,).
+        atoms: for each of `shape.atoms` a column of numbers of atoms (see `ground.numbers`), shape (n,).
         shape: clause, table, or function of counts.
         row: shape (n,), row of the template.
         count: shape (n,), how many groundings.
@@ -54,28 +55,24 @@ class Blocks:
     counts: tuple[Counts, ...]
 
 
-def blocks_of(pieces: Weighted, index: Index, n_atoms: int, n_weights: int) -> Blocks:
+def blocks_of(pieces: Weighted, index: Index, n_atoms: int) -> Blocks:
     """The factors that pieces are.
 
     Args:
-        pieces: of all templates.
+        pieces: of all templates, one template after the other.
         index: of atoms in the network.
         n_atoms: of the network.
-        n_weights: of the network.
     """
-
-    def bounds(mine: Weighted, k: int, number: int) -> Bounds:
-        return Bounds(sum(len(p.row) for p, _ in mine), k, number, n_weights)
-
     clauses, tables, counts = [], [], []
     for (k, negated), mine in sorted(_of_kind(pieces, ClauseShape, lambda s: (len(s.atoms), s.negated)).items()):
-        codes = ((_codes(p, index), _weights(p, first), p.count) for p, first in mine)
-        clauses.append(Clauses(*merged_codes(codes, bounds(mine, k, 2 * n_atoms + 2)), negated))
+        codes = _groups(mine, lambda p: _codes(p, index))
+        clauses.append(Clauses(*merged_codes(codes, k, 2 * n_atoms + 2), negated))
     for (k, truth), mine in sorted(_of_kind(pieces, TableShape, lambda s: (s.truth.ndim, s.truth.tobytes())).items()):
-        rows, weight, count = _merged(mine, index, bounds(mine, k, n_atoms))
+        rows, weight, count = merged(_groups(mine, lambda p: _indices(p, index)), k, n_atoms)
         tables.append(Tables(rows, np.frombuffer(truth, np.bool_).reshape((2,) * k), weight, count))
     for shape, mine in _of_kind(pieces, CountShape, lambda s: s).items():
-        counts.append(counts_of(shape, *_merged(mine, index, bounds(mine, len(shape.steps), n_atoms))))
+        groups = _groups(mine, lambda p: _indices(p, index))
+        counts.append(counts_of(shape, *merged(groups, len(shape.steps), n_atoms)))
     return Blocks(tuple(clauses), tuple(tables), tuple(counts))
 
 
@@ -88,14 +85,21 @@ def _of_kind(pieces: Weighted, kind: type[S], key: Callable[[S], K]) -> dict[K, 
     return found
 
 
+def _groups(pieces: Weighted, columns: Callable[[Piece], list[Int32]]) -> list[Group]:
+    """The rows of each template, those of a piece made when it is its turn."""
+    groups = []
+    for first, same in groupby(pieces, lambda p: p[1]):
+        mine = [piece for piece, _ in same]
+        n_weights = max(int(p.row.max(initial=0)) for p in mine) + 1
+        rows = ((columns(p), p.row, p.count) for p in mine)
+        groups.append(Group(rows, sum(len(p.row) for p in mine), first, n_weights))
+    return groups
+
+
 def _codes(piece: Piece, index: Index) -> list[Int32]:
     assert isinstance(piece.shape, ClauseShape)
     return [code_of(index(a), sign) for a, sign in zip(piece.atoms, piece.shape.signs, strict=True)]
 
 
-def _weights(piece: Piece, first: int) -> Int32:
-    return (piece.row + first).astype(np.int32)
-
-
-def _merged(pieces: Weighted, index: Index, bounds: Bounds) -> Factors:
-    return merged((([index(a) for a in p.atoms], _weights(p, first), p.count) for p, first in pieces), bounds)
+def _indices(piece: Piece, index: Index) -> list[Int32]:
+    return [index(a) for a in piece.atoms]

@@ -6,7 +6,7 @@ variables that no literal generates range over the constants of their type.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 
@@ -26,7 +26,8 @@ from mlnlite.engines.plan import (
     Where,
     columns_of,
 )
-from mlnlite.ground.tables import KNOWN_FALSE
+from mlnlite.ground.numbers import first_numbers
+from mlnlite.ground.tables import KNOWN_FALSE, KNOWN_TRUE
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import Argument, AtomRef, AtomSchema, Const, Equal, Formula, Var
 from mlnlite.model.propositional import Counted, Cube
@@ -107,15 +108,16 @@ class _Filter:
     apply: Callable[[Plan], Plan]
 
 
-def bindings(source: Source, cube: Cube, needed: Sequence[int]) -> Plan:
+def bindings(source: Source, cube: Cube, needed: Sequence[int], *, with_atoms: bool = False) -> Plan:
     """Bindings of the `needed` variables (and the row, and the world) for which evidence contradicts no literal.
 
     Args:
         source: the formula and what is known.
         cube: literals that must be possible.
         needed: variables that must be bound even if no literal mentions them.
+        with_atoms: literals of open predicates filter by the columns of their atoms, which stay; see `with_atom`.
     """
-    generators, filters = _parts(source, cube)
+    generators, filters = _parts(source, cube, with_atoms)
     equal = [p for p, truth in cube.items() if isinstance(p, Equal) and truth]
     wanted = set(needed).union(*(f.needs for f in filters), *(g[1] for g in generators))
     wanted |= set().union(*(variables_of((e.left, e.right)) for e in equal))
@@ -139,7 +141,7 @@ def bindings(source: Source, cube: Cube, needed: Sequence[int]) -> Plan:
     return plan
 
 
-def _parts(source: Source, cube: Cube) -> tuple[list[tuple[Plan, set[int], int]], list[_Filter]]:
+def _parts(source: Source, cube: Cube, with_atoms: bool) -> tuple[list[tuple[Plan, set[int], int]], list[_Filter]]:
     """Generators (plan, variables, size) and filters of a cube."""
     generators: list[tuple[Plan, set[int], int]] = []
     filters: list[_Filter] = []
@@ -164,13 +166,21 @@ def _parts(source: Source, cube: Cube) -> tuple[list[tuple[Plan, set[int], int]]
             scan = Scan(f"{schema.predicate}.true", source.columns(schema))
             generators.append((scan, variables_of(schema.arguments), n_true))
         elif source.n_known(schema, not truth):
-            filters.append(_excluded(source, schema, not truth))
+            looked_up = with_atoms and not source.is_closed(schema)
+            filters.append(
+                _looked_up(source, proposition.index, not truth) if looked_up else _excluded(source, schema, not truth)
+            )
     return generators, filters
 
 
 def _excluded(source: Source, schema: AtomSchema, truth: bool) -> _Filter:
     table = f"{schema.predicate}.{'true' if truth else 'false'}{source.excluded}"
     return _without(schema, Scan(table, source.columns(schema)))
+
+
+def _looked_up(source: Source, index: int, truth: bool) -> _Filter:
+    needs = frozenset(variables_of(source.formula.atoms[index].arguments))
+    return _Filter(needs, lambda plan: with_atom(plan, source, index, KNOWN_TRUE if truth else KNOWN_FALSE))
 
 
 def _without(schema: AtomSchema, scan: Scan) -> _Filter:
@@ -272,14 +282,15 @@ def compiled(source: Source, cubes: Sequence[Cube], equalities: Sequence[Equal])
     plan: Plan
     known: dict[AtomRef | Equal, bool] = {}
     if len(cubes) == 1:
-        plan = bindings(source, cubes[0], free)
+        plan = bindings(source, cubes[0], free, with_atoms=True)
         known = {p: t for p, t in cubes[0].items() if isinstance(p, Equal) or _decided(source, p)}
     else:
         columns = (*map(column, free), *(("row",) if source.tabled else ()))
         plan = Union(tuple(Project(bindings(source, cube, free), columns) for cube in cubes))
     atoms = tuple(i for i in range(len(source.formula.atoms)) if AtomRef(i) not in known)
+    there = columns_of(plan)
     for i in atoms:
-        plan = with_atom(plan, source, i)
+        plan = plan if atom_column(i) in there else with_atom(plan, source, i)
     open_equalities = tuple(e for e in equalities if e not in known)
     for i, equality in enumerate(open_equalities):
         plan = _with_equality(plan, i, equality)
@@ -301,10 +312,16 @@ def strides(evidence: Evidence, predicate: str) -> list[int]:
     return [prod(sizes[i + 1 :]) for i in range(len(sizes))]
 
 
-def affine(evidence: Evidence, schema: AtomSchema) -> tuple[dict[str, int], int]:
-    """The number of an atom as a sum: the factors of columns of variables, and a constant."""
+def affine(evidence: Evidence, schema: AtomSchema, first: Mapping[str, int]) -> tuple[dict[str, int], int]:
+    """The number of an atom as a sum: the factors of columns of variables, and a constant.
+
+    Args:
+        evidence: has the types.
+        schema: the atom.
+        first: number of the first atom of each predicate.
+    """
     terms: dict[str, int] = {}
-    constant = evidence.first_atom()[schema.predicate]
+    constant = first[schema.predicate]
     for argument, stride in zip(schema.arguments, strides(evidence, schema.predicate), strict=True):
         if isinstance(argument, Const):
             constant += argument.id * stride
@@ -313,24 +330,30 @@ def affine(evidence: Evidence, schema: AtomSchema) -> tuple[dict[str, int], int]
     return terms, constant
 
 
-def with_number(plan: Plan, evidence: Evidence, schema: AtomSchema, name: str) -> Plan:
-    """Adds the number of an atom as column `name`."""
-    terms, constant = affine(evidence, schema)
+def with_number(plan: Plan, evidence: Evidence, schema: AtomSchema, name: str, first: Mapping[str, int]) -> Plan:
+    """Adds the number of an atom as column `name`; see `affine`."""
+    terms, constant = affine(evidence, schema, first)
     return Compute(plan, name, tuple(terms.items()), constant)
 
 
-def with_atom(plan: Plan, source: Source, index: int) -> Plan:
-    """Adds the column of atom `index`: its number, or `KNOWN_TRUE`, or `KNOWN_FALSE`."""
+def with_atom(plan: Plan, source: Source, index: int, dropped: int | None = None) -> Plan:
+    """Adds the column of atom `index`: its number (see `ground.numbers`), or `KNOWN_TRUE`, or `KNOWN_FALSE`.
+
+    Args:
+        plan: binds the variables of the atom.
+        source: the formula and what is known.
+        index: of the atom in the formula.
+        dropped: `KNOWN_TRUE` or `KNOWN_FALSE`: rows in which that is known of the atom go.
+    """
     schema = source.formula.atoms[index]
     has_facts = bool(len(source.evidence.facts[schema.predicate].truth))
-    closed = source.is_closed(schema)
+    table = f"{schema.predicate}.known"
     key = (0 if source.world is None else source.world, *map(side, schema.arguments))
-    if closed:
-        return Lookup(plan, f"{schema.predicate}.known", key, atom_column(index), KNOWN_FALSE)
-    if not has_facts:
-        return with_number(plan, source.evidence, schema, atom_column(index))
-    plan = with_number(plan, source.evidence, schema, f"n{index}")
-    return Lookup(plan, f"{schema.predicate}.known", key, atom_column(index), f"n{index}")
+    if source.is_closed(schema):
+        return Lookup(plan, table, key, atom_column(index), KNOWN_FALSE)
+    name = f"n{index}" if has_facts else atom_column(index)
+    plan = with_number(plan, source.evidence, schema, name, first_numbers(source.evidence))
+    return Lookup(plan, table, key, atom_column(index), name, dropped) if has_facts else plan
 
 
 def _with_equality(plan: Plan, index: int, equality: Equal) -> Plan:

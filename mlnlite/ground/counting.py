@@ -17,6 +17,7 @@ from mlnlite.engines.plan import Count, Plan, Project, Relation, Union
 from mlnlite.errors import LimitReached
 from mlnlite.ground.compile import Compiled, Source, affine, bindings, column, side, variables_of
 from mlnlite.ground.groups import Group
+from mlnlite.ground.numbers import first_numbers, known_numbers
 from mlnlite.ground.residual import Decided, atoms_in, equalities_in, truth_table
 from mlnlite.ground.states import NONE, reduced
 from mlnlite.ground.tables import KNOWN_FALSE, KNOWN_TRUE
@@ -225,8 +226,9 @@ def _numbers(source: Source, rows: Relation, n: int) -> Int64:
     constant = np.empty(len(source.formula.atoms), np.int64)
     factor = np.zeros((len(variables), len(source.formula.atoms)), np.int64)
     by_predicate: dict[str, list[int]] = {}
+    first = first_numbers(evidence)
     for i, schema in enumerate(source.formula.atoms):
-        terms, constant[i] = affine(evidence, schema)
+        terms, constant[i] = affine(evidence, schema, first)
         for name, stride in terms.items():
             factor[place[name], i] = stride
         by_predicate.setdefault(schema.predicate, []).append(i)
@@ -239,7 +241,7 @@ def _numbers(source: Source, rows: Relation, n: int) -> Int64:
 def _known(evidence: Evidence, predicate: str, numbers: Int64) -> Int64:
     """Numbers of atoms of a predicate with `KNOWN_TRUE` or `KNOWN_FALSE` in place of those that are known."""
     facts = evidence.facts[predicate]
-    known = evidence.atom_number(predicate, facts.arguments)
+    known = known_numbers(predicate, evidence)
     value = np.where(facts.truth, KNOWN_TRUE, KNOWN_FALSE)
     low, high = int(numbers.min(initial=0)), int(numbers.max(initial=0)) + 1
     inside = (known >= low) & (known < high)

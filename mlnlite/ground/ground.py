@@ -19,9 +19,10 @@ from mlnlite.ground.blocks import Piece
 from mlnlite.ground.compile import Compiled, Source, atom_column, bindings, column, compiled, with_atom
 from mlnlite.ground.counting import counting_groups, counting_plan, plain_cubes
 from mlnlite.ground.forecast import Forecast, Limits, advice, forecast, machine_limits, too_large, verify, within
-from mlnlite.ground.groups import Group, groups_of
+from mlnlite.ground.groups import Group, groups_of, taken
 from mlnlite.ground.network import Network
 from mlnlite.ground.residual import Decided, equalities_in
+from mlnlite.ground.room import Cut, room
 from mlnlite.ground.states import NARROW
 from mlnlite.ground.tables import completed, tables_of
 from mlnlite.model.evidence import Evidence
@@ -239,12 +240,13 @@ def tally_of(source: Source, planned: TemplatePlan, run: Run, parts: Sequence[Pl
     """What the plan of a template lists, which several plans list together; None and raises as `part_of`."""
     plan = planned.compiled
     tally = Tally([], *(np.zeros(source.n_rows, np.int64) for _ in range(3)))
+    cut = room()
     for part in parts:
         rows = run(part)
-        groups = counting_groups(source, rows) if source.counted else groups_of(source.formula, plan, rows)
+        groups = counting_groups(source, rows) if source.counted else groups_of(source.formula, plan, rows, cut)
         if groups is None:
             return None
-        _add(tally, source, plan, rows, groups)
+        _add(tally, source, plan, rows, groups, cut)
     return tally
 
 
@@ -324,13 +326,13 @@ class Tally:
     open: Int64
 
 
-def _add(tally: Tally, source: Source, plan: Compiled, rows: Relation, groups: Sequence[Group]) -> None:
+def _add(tally: Tally, source: Source, plan: Compiled, rows: Relation, groups: Sequence[Group], cut: Cut) -> None:
     """Adds groups of rows to a tally."""
     n_rows = len(next(iter(rows.values()))) if rows else 1
     for group in groups:
         n = n_rows if isinstance(group.index, slice) else len(group.index)
-        row = rows["row"][group.index] if source.tabled else np.broadcast_to(np.int32(0), n)
-        count = rows["count"][group.index] if plan.counted else np.broadcast_to(np.int64(1), n)
+        row = taken(rows["row"], group.index, cut) if source.tabled else np.broadcast_to(np.int32(0), n)
+        count = taken(rows["count"], group.index, cut) if plan.counted else np.broadcast_to(np.int64(1), n)
         sums = sums_by(row, count, source.n_rows)
         if isinstance(group.shape, Decided):
             decided = tally.true if group.shape.truth else tally.false

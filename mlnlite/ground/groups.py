@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mlnlite.engines.plan import Relation
 from mlnlite.ground.compile import Compiled, atom_column, equality_column
 from mlnlite.ground.residual import CountShape, Decided, Shape, shape_of
+from mlnlite.ground.room import Cut
 from mlnlite.ground.tables import KNOWN_TRUE
 from mlnlite.model.formulas import All, Any, AtomRef, Expression, Formula, Iff, Not
 from mlnlite.model.propositional import Proposition, simplified
@@ -33,13 +34,14 @@ class Group:
     atoms: tuple[Int64, ...]
 
 
-def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
+def groups_of(formula: Formula, plan: Compiled, rows: Relation, cut: Cut) -> list[Group]:
     """All rows, gathered by their residual shape.
 
     Args:
         formula: without quantifiers.
         plan: what the rows are of.
         rows: the result of running it.
+        cut: gives the arrays for what stays.
     """
     n_rows = len(next(iter(rows.values()))) if rows else 1
     features = _features(formula, plan, rows)
@@ -60,13 +62,17 @@ def groups_of(formula: Formula, plan: Compiled, rows: Relation) -> list[Group]:
         known, merged = _meaning({key: int(column[first]) for key, column in features.items()})
         body = simplified(renamed(formula.body, merged), {**plan.known, **known})
         shape = shape_of(body)
-        atoms = () if isinstance(shape, Decided) else tuple(_taken(rows[atom_column(i)], index) for i in shape.atoms)
+        listed = () if isinstance(shape, Decided) else shape.atoms
+        atoms = tuple(taken(rows[atom_column(i)], index, cut) for i in listed)
         groups.append(Group(index, shape, atoms))
     return groups
 
 
-def _taken(column: Int64, index: Int64 | slice) -> Int64:
-    return column[index] if isinstance(index, slice) else column.take(index, mode="clip")
+def taken(column: NDArray[Any_], index: Int64 | slice, cut: Cut) -> NDArray[Any_]:
+    """The values of a column in some rows."""
+    if isinstance(index, slice):
+        return column[index]
+    return column.take(index, mode="clip", out=cut(len(index), column.dtype))
 
 
 def _equal_rows(code: NDArray[Any_], base: int) -> Sequence[Int64 | slice]:

@@ -59,7 +59,8 @@ def violations(
         most: no more than so many of each kind of clause.
 
     Returns:
-        Pieces of clauses (the disjunction of literals that are all false in the world), over known atoms too.
+        Pieces of clauses (the disjunction of literals that are all false in the world), over known atoms too, which are
+        given as `Evidence.atom_number` has them.
     """
     tables = {**tables_of(world), **row_tables(network.model)}
     source = source_of(template, network.model.templates[template], world)
@@ -72,7 +73,7 @@ def violations(
         literals = [(p.index, truth) for p, truth in cube.items() if isinstance(p, AtomRef)]
         plan = bindings(source, cube, source.formula.free)
         for index, _ in literals:
-            plan = with_number(plan, world, source.formula.atoms[index], column_of(index))
+            plan = with_number(plan, world, source.formula.atoms[index], column_of(index), world.first_atom())
         rows = run(plan)
         pieces += _pieces(source, literals, rows, most)
     return pieces

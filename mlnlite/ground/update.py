@@ -39,6 +39,7 @@ from mlnlite.ground.ground import (
     violation,
 )
 from mlnlite.ground.network import Network
+from mlnlite.ground.numbers import atoms_numbered, numbers_of
 from mlnlite.ground.patch import renumbered, together, without
 from mlnlite.ground.tables import completed, tables_of
 from mlnlite.model.change import find
@@ -69,11 +70,12 @@ def updated(
     mine = distinct(list(touched.values()))
     difference = _difference(network, now, touched, engine)
     asked = np.empty(0, np.int64) if query is None else unknown(np.intersect1d(query, mine), now)
-    new = distinct([asked, *(a for piece, _ in difference.put for a in piece.atoms)])
+    new = distinct([numbers_of(asked, now), *(a for piece, _ in difference.put for a in piece.atoms)])
+    new = atoms_numbered(new, now)
     atoms, block = with_blocks(_with_atoms(network.atoms, new, np.setdiff1d(mine, unknown(mine, now))), now)
     variable, value, cardinality, is_block = variables_of(atoms, block, now)
-    taken = blocks_of(difference.taken, index_in(network.atoms), network.n_atoms, len(network.weights))
-    put = blocks_of(difference.put, index_in(atoms), len(atoms), len(network.weights))
+    taken = blocks_of(difference.taken, index_in(numbers_of(network.atoms, now)), network.n_atoms)
+    put = blocks_of(difference.put, index_in(numbers_of(atoms, now)), len(atoms))
     left = without(Blocks(network.clauses, network.tables, network.counts), taken, difference.dropped)
     blocks = together(renumbered(left, network.atoms, atoms), put)
     return replace(

@@ -32,6 +32,8 @@ PLANS = [
     Compute(R, "n", (("x", 7), ("y", -3)), 5),
     Lookup(R, "t", ("x",), "n", "y"),
     Lookup(R, "t", ("y",), "n", -1),
+    Lookup(R, "t", ("x",), "n", "y", dropped=1),
+    Lookup(Lookup(R, "t", ("x",), "n", "y", dropped=1), "t", ("y",), "m", -1, dropped=0),
     Union((Project(R, ("y",)), Project(S, ("y",)))),
     Union((R, Scan("s", ("x", "y")))),
     Count(Join(R, S), ("x",)),

@@ -137,7 +137,7 @@ def _plan(source: Source, case: Case, others: list[tuple[AtomSchema, bool]], tar
     cube |= dict.fromkeys(case.different, False)
     cube |= {Equal(variable, by): True for variable, by in case.same}
     plan = bindings(replace(source, formula=formula), cube, source.formula.free)
-    plan = with_number(plan, source.evidence, target, "atom")
+    plan = with_number(plan, source.evidence, target, "atom", source.evidence.first_atom())
     by = (*((source.world,) if source.world else ()), *(("row",) if source.tabled else ()), "atom")
     return Count(plan, by)
 
