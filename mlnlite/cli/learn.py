@@ -279,7 +279,14 @@ def _with_rules(model: Model, databases: Evidence, options: _Options) -> Model:
     others = [name for name in model.predicates if name not in _predicates(predict)]
     given = names(options["given"]) or others
     with working("looking for rules"):
-        found = ml.find_rules(model, databases, predict=predict, given=given, seed=options["seed"])
+        found = ml.find_rules(
+            model,
+            databases,
+            predict=predict,
+            given=given,
+            open_predicates=names(options["open_predicates"]),
+            seed=options["seed"],
+        )
     click.echo(f"{found}\n", err=True)
     return found.model
 

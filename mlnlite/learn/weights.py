@@ -68,7 +68,7 @@ def learn(  # noqa: PLR0913
     verify_prior(prior, model.templates, how.objective)
     model = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
     with interruptible(deadline):
-        task = task_of(model, databases, how, _names(model, how.predict, "predict"), engine)
+        task = task_of(model, databases, how, predicates_named(model, how.predict, "predict"), engine)
         counted = monotonic()
         solution = solved(model, task, prior, Search(_start(model) if resume else None, seed, deadline))
     learned = _learned(with_constants(model, databases), task.problem, solution)
@@ -85,10 +85,10 @@ def how_of(
     database_weights: Sequence[float] | None,
 ) -> How:
     """What is to be learnt, as the learnt model remembers it; `names` are those of what is predicted and open."""
-    predict = None if names[0] is None else _names(model, names[0], "predict")
-    unknown = _names(model, frozenset(names[1]), "leave open")
+    predict = None if names[0] is None else predicates_named(model, names[0], "predict")
+    unknown = predicates_named(model, frozenset(names[1]), "leave open")
     return How(
-        _objective(objective, unknown, model, databases, _names(model, predict, "predict")),
+        _objective(objective, unknown, model, databases, predicates_named(model, predict, "predict")),
         None if predict is None else tuple(sorted(predict)),
         tuple(sorted(unknown)),
         tuple(map(tuple, tied)),
@@ -136,7 +136,12 @@ def with_constants(model: Model, databases: Evidence) -> Model:
     return replace(model, types={n: databases.types[n] if n in keys else t for n, t in model.types.items()})
 
 
-def _names(model: Model, given: Iterable[str] | None, what: str) -> frozenset[str]:
+def predicates_named(model: Model, given: Iterable[str] | None, what: str) -> frozenset[str]:
+    """The predicates of these names, by default all.
+
+    Raises:
+        QueryMistake: if there is none of a name.
+    """
     all_names = (n for n, p in model.predicates.items() if p.comparison is None)
     names = frozenset(all_names if given is None else given)
     for name in sorted(names - set(model.predicates)):

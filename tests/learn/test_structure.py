@@ -14,7 +14,10 @@ VOCABULARY = "Ill(p)\nSmokes(p)\nSporty(p)\nCoffee(p)\nRich(p)\nFriends(p, p)\n"
 PLANTED = {"Smokes(x) => Ill(x)", "Sporty(x) => Ill(x)", "Friends(x, y) ^ Rich(y) => Ill(x)"}
 
 
-def planted(n, seed, strength=1.0):
+GIVEN = ["Smokes", "Sporty", "Coffee", "Rich", "Friends"]
+
+
+def planted_lines(n, seed, strength=1.0):
     """People whose illness depends on smoking, sport, and how many of their friends are rich."""
     random = np.random.default_rng(seed)
     smokes, sporty, coffee, rich = (random.random(n) < p for p in (0.3, 0.4, 0.5, 0.3))
@@ -25,8 +28,22 @@ def planted(n, seed, strength=1.0):
     lines = [f"Friends(P{a}, P{b})" for a, b in friends.tolist()]
     for name, truth in {"Smokes": smokes, "Sporty": sporty, "Coffee": coffee, "Rich": rich, "Ill": ill}.items():
         lines += [f"{name}(P{i})" for i in np.flatnonzero(truth).tolist()]
-    model = ml.model_from_text(VOCABULARY)
+    return ml.model_from_text(VOCABULARY), lines
+
+
+def planted(n, seed, strength=1.0):
+    model, lines = planted_lines(n, seed, strength)
     return model, ml.evidence_from_text("\n".join(lines), model=model)
+
+
+def without(lines, unknown, n):
+    """The facts with a share of the atoms of some predicates marked."""
+    random = np.random.default_rng(1)
+    for name, share in unknown.items():
+        who = random.choice(n, int(share * n), replace=False).tolist()
+        hidden = {f"{name}(P{i})" for i in who}
+        lines = [line for line in lines if line not in hidden] + [f"?{atom}" for atom in sorted(hidden)]
+    return lines
 
 
 def f1(found, wanted):
@@ -125,8 +142,59 @@ def test_no_candidate_is_refused():
         find_rules(model, data, predict=["S"], given=["H"])
 
 
-def test_unknown_atoms_are_refused():
+@pytest.mark.parametrize("unknown", [{"Ill": 0.3}, {"Ill": 0.2, "Smokes": 0.3}, {"Rich": 0.3}])
+def test_planted_rules_are_found_where_labels_are_missing(unknown):
+    model, lines = planted_lines(1000, 0)
+    data = ml.evidence_from_text("\n".join(without(lines, unknown, 1000)), model=model)
+    found = find_rules(model, data, predict=["Ill"], given=GIVEN, resamples=2)
+    assert f1({r.text for r in found.rules}, PLANTED) == 1.0
+    weights = {r.text: r.weight for r in found.rules}
+    assert weights["Smokes(x) => Ill(x)"] == pytest.approx(1.5, abs=0.6)
+
+
+def test_nothing_is_found_in_noise_where_labels_are_missing():
+    model, lines = planted_lines(600, 1, strength=0.0)
+    data = ml.evidence_from_text("\n".join(without(lines, {"Ill": 0.3, "Smokes": 0.3}, 600)), model=model)
+    assert find_rules(model, data, predict=["Ill"], given=GIVEN[:3], resamples=2).rules == ()
+
+
+def test_unknown_atoms_do_not_count_as_examples():
+    """People of whom nothing is known but that they smoke change nothing; taken for healthy, they would."""
     model = ml.model_from_text("S(p)\nC(p)\n")
-    data = ml.evidence_from_text("S(A)\n?C(A)\nC(B)", model=model)
-    with pytest.raises(ml.QueryMistake, match="complete data"):
-        find_rules(model, data, predict=["C"])
+    known = [f"S(P{i})" for i in range(60)] + [f"C(P{i})" for i in range(45)] + [f"C(Q{i})" for i in range(15)]
+    people = ", ".join(f"{name}{i}" for name in "PQ" for i in range(60))
+    data = ml.evidence_from_text("\n".join([f"p = {{{people}}}", *known]), model=model)
+    more = [f"S(R{i})\n?C(R{i})" for i in range(60)]
+    marked = ml.evidence_from_text("\n".join([f"p = {{{people}}}", *known, *more]), model=model)
+    false = [
+        f"!C({name}{i})" for name, start in (("P", 45), ("Q", 15)) for i in range(60) if (name == "P") <= (i >= 45)
+    ]
+    false = [line for line in false if line[1:] not in known]
+    opened = ml.evidence_from_text("\n".join([*known, *false, *(f"S(R{i})" for i in range(60))]), model=model)
+    (rule,) = find_rules(model, data, predict=["C"], given=["S"], resamples=0).rules
+    for other, options in ((marked, {}), (opened, {"open_predicates": ["C"]})):
+        (again,) = find_rules(model, other, predict=["C"], given=["S"], resamples=0, **options).rules
+        assert (again.text, again.weight) == (rule.text, pytest.approx(rule.weight, abs=1e-6))
+        assert again.score == pytest.approx(rule.score, abs=1e-6)
+
+
+def test_unknown_values_of_blocks_are_drawn_and_not_examples():
+    model = ml.model_from_text("level(person, degree!)\nway(person, how!)")
+    low = [("Low", "High")[i % 2] for i in range(120)]
+    how = [("Near", "Far")[(i + (i % 10 == 9)) % 2] for i in range(120)]
+    facts = [f"level(P{i}, {low[i]})" for i in range(120) if i % 6] + [
+        f"way(P{i}, {how[i]})" for i in range(120) if i % 7
+    ]
+    facts += [f"?way(P{i}, Near)\n?way(P{i}, Far)" for i in range(0, 120, 7)]
+    data = ml.evidence_from_text("\n".join(facts), model=model)
+    found = find_rules(model, data, predict=["way(+, #)"], given=["level(+, #)"], most_literals=1, resamples=0)
+    signs = {"level(x, Low) => way(x, Near)": 1, "level(x, High) => way(x, Near)": -1}
+    signs |= {"level(x, Low) => way(x, Far)": -1, "level(x, High) => way(x, Far)": 1}
+    assert signs[found.rules[0].text] * found.rules[0].weight > 2
+
+
+def test_a_predicate_to_leave_open_must_be_there():
+    model = ml.model_from_text("S(p)\nC(p)\n")
+    data = ml.evidence_from_text("S(A)\nC(B)", model=model)
+    with pytest.raises(ml.QueryMistake, match="no predicate D to leave open"):
+        find_rules(model, data, predict=["C"], open_predicates=["D"])

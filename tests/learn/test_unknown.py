@@ -135,3 +135,13 @@ def test_effects_refuse_what_has_no_likelihood():
     complete = ml.evidence_from_text("S(A)\nC(A)\nS(B)\np = {A, B, C}", model=model)
     with pytest.raises(ml.QueryMistake, match="max-margin"):
         ml.effects(ml.learn(model, complete, predict=["C"], objective="max-margin"))
+
+
+def test_databases_that_leave_all_open_are_not_those_that_close_it():
+    """Of one it is unknown who smokes, in the other nobody does: the order does not matter."""
+    model = ml.model_from_text("S(p)\nC(p)\np = {A}\nS(x) => C(x)\nC(x)\nS(x)")
+    learned = [
+        ml.learn(model, ml.evidence_from_text("\n---\n".join(worlds), model=model), predict=["C"], prior=1.0)
+        for worlds in (["?S(A)\nC(A)", "C(A)"], ["C(A)", "?S(A)\nC(A)"])
+    ]
+    assert learned[0].weights == pytest.approx(learned[1].weights, abs=1e-9)

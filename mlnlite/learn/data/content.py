@@ -11,11 +11,11 @@ from mlnlite.model.evidence import Evidence
 
 
 def content(evidence: Evidence, predicates: Iterable[str]) -> tuple[bytes, ...]:
-    """The constants of one database, and its facts about some predicates."""
+    """The constants of one database, its facts about some predicates, and whether their worlds are closed."""
     parts = [np.packbits(p[0]).tobytes() for p in evidence.present.values()]
     for name in predicates:
         facts = evidence.facts[name]
-        parts += [facts.arguments.tobytes(), facts.truth.tobytes()]
+        parts += [facts.arguments.tobytes(), facts.truth.tobytes(), bytes([evidence.predicates[name].closed])]
     return tuple(parts)
 
 

@@ -138,9 +138,9 @@ def _listed(rows: _Rows, n_weights: int) -> Listed:
     return Listed(matrix, np.ones(len(choice)), choice, world, filled.astype(np.int64), len(lengths), np.zeros(1))
 
 
-def world_counts(network: Network, part: Int64) -> WorldTable:
-    """The worlds of a component."""
-    return _table(network, np.zeros(network.n_variables, np.int64), part, incidence(network))
+def world_counts(network: Network, part: Int64, touching: sparse.csr_array) -> WorldTable:
+    """The worlds of a component; `touching` is the network's `incidence`."""
+    return _table(network, np.zeros(network.n_variables, np.int64), part, touching)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,9 @@ statistic falls below that when others have come are dropped again. (Rao 1948; S
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from scipy.stats import chi2
 
 from mlnlite.errors import QueryMistake
 from mlnlite.learn.data.merge import Choices
-from mlnlite.learn.data.missing import has_marks
+from mlnlite.learn.data.missing import is_incomplete
 from mlnlite.learn.evaluation.evaluate import target_names
 from mlnlite.learn.objectives.choose import pseudo_problem
 from mlnlite.learn.optimise import information
@@ -26,7 +27,9 @@ from mlnlite.learn.optimise.problem import Problem
 from mlnlite.learn.optimise.solve import best
 from mlnlite.learn.prior import Penalty
 from mlnlite.learn.structure.candidates import Language, candidates, rule_text
+from mlnlite.learn.structure.impute import Hidden, completions, hidden, problem_with
 from mlnlite.learn.structure.modes import modes_of
+from mlnlite.learn.weights import predicates_named
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import AtomRef
 from mlnlite.model.model import Model
@@ -84,12 +87,13 @@ class Structure:
         return "\n".join([*lines, f"{len(self.rules)} of {self.n_candidates:,} candidates"])
 
 
-def find_rules(
+def find_rules(  # noqa: PLR0913
     model: Model,
     databases: Evidence,
     *,
     predict: Iterable[str],
     given: Iterable[str] | None = None,
+    open_predicates: Iterable[str] = (),
     most_literals: int = 2,
     most_rules: int = 20,
     resamples: int = 20,
@@ -97,49 +101,74 @@ def find_rules(
 ) -> Structure:
     """Rules that explain some predicates by others.
 
+    Unknown atoms are drawn from the rules found so far, given what is known, and do not count as examples.
+
     Args:
         model: the vocabulary, and formulas that are kept.
-        databases: complete.
+        databases: the data.
         predict: predicates that rules conclude, by name or as modes such as `method(+, #)`.
         given: predicates that rules may ask about, by name or as modes such as `Friends(+, -)`; by default all. A sign
             says what an argument is: `+` a variable that stands in the head or further left, `-` such a variable or a
             new one, `#` a constant (a rule for each). By name, variables stand everywhere, one new one at most.
+        open_predicates: predicates whose atoms are unknown where they are not facts.
         most_literals: of a rule's body.
         most_rules: how many to add.
         resamples: bootstrap samples for the stability of the rules; atoms are drawn, as if independent.
-        seed: of the bootstrap.
+        seed: of the bootstrap, and of what is drawn for unknown atoms.
 
     Raises:
-        QueryMistake: if there is no candidate, a mode does not fit, or an atom is unknown.
+        QueryMistake: if there is no candidate, or a mode does not fit.
     """
     heads = modes_of(predict, model.predicates)
     bodies = modes_of(model.predicates if given is None else given, model.predicates)
     targets = target_names(databases, {mode.predicate: None for mode in heads})
-    if has_marks(databases):
-        hint = "weights can be learnt with unknown atoms; to look for rules, decide whether they are true"
-        raise QueryMistake("rules are looked for in complete data, and these leave atoms unknown", hint)
-    found_rules = candidates(Language(model.predicates, databases.types, heads, bodies), most_literals)
-    rules = [rule_text(rule, model.dialect) for rule in found_rules]
-    units = [_unit(model, name) for name in targets if not _has_unit(model, name)]
+    unknown = predicates_named(model, frozenset(open_predicates), "leave open")
+    language = Language(model.predicates, databases.types, heads, bodies)
+    rules = tuple(rule_text(rule, model.dialect) for rule in candidates(language, most_literals))
     if not rules:
         raise QueryMistake("there is no rule to try", "name more predicates, or allow longer bodies")
-    every = model_from_text("\n".join([model_text(model), *units, *rules]), dialect=model.dialect)
-    every = replace(every, templates=tuple(t.expanded(databases.types) for t in every.templates))
-    problem = pseudo_problem(every, databases, frozenset(targets))
-    tried = _columns(problem, rules)
-    found = _search(problem, tried, most_rules)
-    kept = _stability(problem, tried, most_rules, (resamples, seed))
+    kept = _with_units(model, targets)
+    task = _Task(_with_rules(kept, rules), rules, frozenset(targets), most_rules)
+    if unknown or is_incomplete(task.every, databases, targets):
+        found = _search_incomplete(task, hidden(task.every, databases, unknown), np.random.default_rng(seed))
+    else:
+        found = _search(task, pseudo_problem(_expanded(task.every, databases), databases, task.targets))
+    stable = _stability(task, found.problem, (resamples, seed))
     made = [
-        Rule(tried[j], float(found.x[j]), s, float(chi2.sf(s, 1)), kept.get(j, 0.0)) for j, s in found.columns.items()
+        Rule(text, float(found.x[j]), score, float(chi2.sf(score, 1)), stable.get(text, 0.0))
+        for text, (j, score) in found.rules.items()
     ]
-    result = model_from_text("\n".join([model_text(model), *units, *(r.text for r in made)]), dialect=model.dialect)
-    return Structure(tuple(made), result, len(rules))
+    return Structure(tuple(made), _with_rules(kept, list(found.rules)), len(rules))
 
 
-def _columns(problem: Problem, rules: Sequence[str]) -> dict[int, str]:
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """What is looked for: a model with all rules, the rules, what they conclude, and how many are wanted at most."""
+
+    every: Model
+    rules: tuple[str, ...]
+    targets: frozenset[str]
+    most_rules: int
+
+
+def _expanded(model: Model, databases: Evidence) -> Model:
+    return replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
+
+
+def _with_rules(model: Model, rules: Sequence[str]) -> Model:
+    """A model with more formulas."""
+    return model_from_text("\n".join([model_text(model), *rules]), dialect=model.dialect)
+
+
+def _with_units(model: Model, names: Iterable[str]) -> Model:
+    """A model in which some formula says how frequent each of the predicates is."""
+    return _with_rules(model, [_unit(model, name) for name in names if not _has_unit(model, name)])
+
+
+def _columns(task: _Task, problem: Problem) -> dict[int, str]:
     """The columns of the problem that are rules; those have the last weights, and some may not matter."""
-    first = len(problem.weights) - len(rules)
-    return {j: rules[w - first] for j, w in enumerate(problem.free.tolist()) if w >= first}
+    first = len(problem.weights) - len(task.rules)
+    return {j: task.rules[w - first] for j, w in enumerate(problem.free.tolist()) if w >= first}
 
 
 def _unit(model: Model, name: str) -> str:
@@ -157,13 +186,13 @@ def _has_unit(model: Model, name: str) -> bool:
     )
 
 
-def _stability(problem: Problem, tried: dict[int, str], most_rules: int, samples: tuple[int, int]) -> dict[int, float]:
-    """In which share of bootstrap samples (their number, seed) each column is found."""
+def _stability(task: _Task, problem: Problem, samples: tuple[int, int]) -> dict[str, float]:
+    """In which share of bootstrap samples (their number, seed) each rule is found."""
     n, seed = samples
-    random, share = np.random.default_rng(seed), dict.fromkeys(tried, 0.0)
+    random, share = np.random.default_rng(seed), dict.fromkeys(task.rules, 0.0)
     for _ in range(n):
-        for j in _search(_resampled(problem, random), tried, most_rules).columns:
-            share[j] += 1 / n
+        for text in _search(task, _resampled(problem, random)).rules:
+            share[text] += 1 / n
     return share
 
 
@@ -180,19 +209,38 @@ def _resampled(problem: Problem, random: np.random.Generator) -> Problem:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """Columns of the rules that were chosen with their scores, and the weights of all columns."""
+    """Rules that were chosen, with their columns and scores; the problem, and the weights of all its columns."""
 
-    columns: dict[int, float]
+    rules: dict[str, tuple[int, float]]
+    problem: Problem
     x: Float
 
 
-def _search(problem: Problem, tried: dict[int, str], most_rules: int) -> _Found:
-    n = problem.every.rows.shape[1]
+def _search_incomplete(task: _Task, unknown: Hidden, random: np.random.Generator) -> _Found:
+    """Rule by rule: what is unknown is drawn from a model with the rules found so far."""
+    every, rules = _expanded(task.every, unknown.databases), set(task.rules)
+    model = _expanded(_with_units(task.every, sorted(unknown.names)), unknown.databases)
+    scores: dict[str, float] = {}
+    for _ in range(task.most_rules):
+        chosen = tuple(t for t in model.templates if t.text not in rules or t.text in scores)
+        drawn = completions(unknown, replace(model, templates=chosen), task.targets, random)
+        step = replace(task, most_rules=len(scores) + 1)
+        found = _search(step, problem_with(unknown, every, drawn, task.targets), scores)
+        new = found.rules.keys() - scores.keys()
+        scores = {text: score for text, (_, score) in found.rules.items()}
+        if not new:
+            break
+    return found
+
+
+def _search(task: _Task, problem: Problem, start: Mapping[str, float] = MappingProxyType({})) -> _Found:
+    """Adds rules to those to start with (and their scores)."""
+    n, tried = problem.every.rows.shape[1], _columns(task, problem)
     fixed = [j for j in range(n) if j not in tried]
     needed = max(float(np.log(max(2.0, problem.every.many.sum()))), _threshold(len(tried)))
-    chosen: dict[int, float] = {}
-    x = _fitted(problem, fixed, np.zeros(n))
-    while len(chosen) < most_rules:
+    chosen = {j: start[text] for j, text in tried.items() if text in start}
+    x = _fitted(problem, [*fixed, *chosen], np.zeros(n))
+    while len(chosen) < task.most_rules:
         scores = _scores(problem.every, x, [*fixed, *chosen])
         scores[[*fixed, *chosen]] = 0.0
         column = int(scores.argmax())
@@ -208,7 +256,7 @@ def _search(problem: Problem, tried: dict[int, str], most_rules: int) -> _Found:
         if weak:
             chosen = {j: s for j, s in chosen.items() if j not in weak}
             x = _fitted(problem, [*fixed, *chosen], x)
-    return _Found(chosen, x)
+    return _Found({tried[j]: (j, score) for j, score in chosen.items()}, problem, x)
 
 
 def _threshold(n_candidates: int) -> float:

@@ -12,7 +12,7 @@ from scipy import sparse
 from mlnlite.ground.ground import ground
 from mlnlite.ground.network import Network
 from mlnlite.learn.data.missing import blocks_of
-from mlnlite.learn.data.worlds import MOST_WORLDS, components, n_worlds, world_counts
+from mlnlite.learn.data.worlds import MOST_WORLDS, components, incidence, n_worlds, world_counts
 from mlnlite.learn.learned import LearnedModel
 from mlnlite.learn.objectives.chains import new_chains, sweep
 from mlnlite.learn.objectives.exact import conditions
@@ -48,7 +48,7 @@ def simulate(
     draws = []
     for i in range(databases.n_databases):
         given = conditions(databases, i, targets, unknown)
-        network = ground(learned.model, given, query=_atoms(given, targets))
+        network = ground(learned.model, given, query=all_atoms(given, targets))
         draws.append((network, draw_worlds(network, repetitions, random)))
 
     def drawn() -> Iterator[Evidence]:
@@ -70,11 +70,11 @@ def draw_worlds(network: Network, repetitions: int, random: np.random.Generator)
     """
     worlds = _sampled(network, repetitions, random) if _is_wide(network) else None
     worlds = np.zeros((repetitions, network.n_variables), np.int64) if worlds is None else worlds
-    hard = np.isposinf(network.weights)
+    hard, touching = np.isposinf(network.weights), incidence(network)
     for part in components(network):
         if n_worlds(network, part) > MOST_WORLDS:
             continue
-        table = world_counts(network, part)
+        table = world_counts(network, part, touching)
         is_hard = hard[table.weights]
         log_weight = table.counts[:, ~is_hard] @ network.weights[table.weights[~is_hard]]
         held = table.counts[:, is_hard].sum(axis=1)
@@ -123,7 +123,7 @@ def _blocks(data: Evidence, predicate: Predicate, arguments: NDArray[np.int32]) 
     return blocks_of(data, predicate, data.atom_number(predicate.name, arguments))
 
 
-def _atoms(evidence: Evidence, targets: frozenset[str]) -> Int64:
+def all_atoms(evidence: Evidence, targets: frozenset[str]) -> Int64:
     """Numbers of all atoms of the targets."""
     found = [np.empty(0, np.int64)]
     for name in targets:
