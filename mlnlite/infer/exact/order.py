@@ -12,9 +12,10 @@ from typing import Literal
 import numpy as np
 
 from mlnlite.ground.network import Int32, Int64
+from mlnlite.infer.exact.width import unavoidable_table
 
 Rule = Literal["fill", "weight", "sweep"]
-_EXPENSIVE = 1 << 21
+_EXPENSIVE, _MANY = 1 << 21, 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +83,7 @@ def _sweep(n: int, edges: tuple[Int64, Int64]) -> list[int]:
 
 
 def plan(cardinality: Int32, scopes: Sequence[Int32], limit: int, total: int | None = None) -> Tree | TooWide:
-    """A clique tree by greedy elimination: fewest fill edges first.
+    """A clique tree by greedy elimination: fewest fill edges first; none if one of many variables is proven too wide.
 
     Where that is expensive, the cheapest of it, a sweep from one end of the graph to the other (which is best for
     long grids, such as anything that repeats in time), and smallest table first.
@@ -95,6 +96,9 @@ def plan(cardinality: Int32, scopes: Sequence[Int32], limit: int, total: int | N
     """
     bits = np.log2(np.maximum(cardinality, 2)).tolist()
     n, edges = len(cardinality), _edges(len(cardinality), scopes)
+    needed = unavoidable_table(_neighbours(n, edges), list(bits), log2(limit) + 1e-9) if n > _MANY else None
+    if needed is not None:
+        return TooWide(*needed)
     rules: tuple[Rule, ...] = ("fill", "sweep", "weight")
     trees, failed = [], []
     for rule in rules:

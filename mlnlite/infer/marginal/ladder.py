@@ -127,7 +127,7 @@ def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple
 
     counted, rung = with_counts(network), _rung_for_wide(network, approach)
     small, merged = _merged(counted, asked, found, approach, (limit, _FAIR))
-    if merged is found:  # nothing excludes each other
+    if merged is found and found.costly:  # nothing excludes each other, and larger tables may do
         merged = marginals_of(network, asked, width_limit=limit, too_wide="leave")
         if not merged.wide:
             return network, network, merged
@@ -171,10 +171,10 @@ def _rung_by_name(approach: Approach) -> Rung | None:
 
 def _rung_for_wide(network: Network, approach: Approach) -> Rung | None:
     """Model counting of components that are mostly hard, if that is installed; for a sixth of the time."""
+    if not (np.isinf(network.weights).any() and is_available()):
+        return None
     limit = PATIENCE if approach.time_limit is None else approach.time_limit
     deadline = in_seconds(limit / _SHARE)
-    if not is_available():
-        return None
 
     def rung(part: Part, wanted: Bool) -> Summed | None:
         try:

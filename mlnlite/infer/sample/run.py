@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -28,7 +28,8 @@ Ending = Literal["precise", "time", "interrupted"]
 LEAST_SIZE = 400.0
 MOST_R_HAT = 1.01
 _FIRST_LOOK, _LATER = 256, 1.5
-_AT_ONCE, _FEWEST, _WORST = 0.2, 8, 64
+_AT_ONCE, _FEWEST, _WORST, _STRIDE = 0.2, 8, 64, 8
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +136,17 @@ _DRAWS: dict[Sampler, Callable[[Chain, int, Int32, Bool], Sums]] = {
 }
 
 
+def warm_up(run: Run, n: int, deadline: Deadline) -> None:
+    """Lets each chain go on by `n` draws that leave no trace, or until time is up."""
+
+    def work(c: int) -> None:
+        for _ in range(0, n, _STRIDE):
+            if not deadline.is_over:
+                run.draws(run.chains[c], _STRIDE, run.watched.atoms, run.even[c])
+
+    _for_each_chain(run, work)
+
+
 def advance(run: Run, n: int) -> None:
     """Adds `n` batches to the traces of each chain."""
     traces = run.traces
@@ -149,11 +161,15 @@ def advance(run: Run, n: int) -> None:
             squares += np.concatenate([sums.total[1, run.columns], formulas])
         return squares
 
-    with ThreadPoolExecutor(min(len(run.chains), os.cpu_count() or 1)) as pool:
-        squares = list(pool.map(work, range(len(run.chains))))
-    traces.squares += np.sum(squares, axis=0)
+    traces.squares += np.sum(_for_each_chain(run, work), axis=0)
     traces.n += n
     traces.n_draws += n * traces.batch
+
+
+def _for_each_chain(run: Run, work: Callable[[int], T]) -> list[T]:
+    """Does something with each chain, on all cores."""
+    with ThreadPoolExecutor(min(len(run.chains), os.cpu_count() or 1)) as pool:
+        return list(pool.map(work, range(len(run.chains))))
 
 
 def _points(run: Run, chain: Chain) -> Float:

@@ -13,7 +13,7 @@ from mlnlite.infer.approach import PATIENCE, Sampler
 from mlnlite.infer.deadline import Deadline, in_seconds, interruptible
 from mlnlite.infer.sample.diagnostics import jeffreys
 from mlnlite.infer.sample.factors import Factors, factors_of
-from mlnlite.infer.sample.run import LEAST_SIZE, MOST_R_HAT, Ending, Look, Run, new_run, until_precise
+from mlnlite.infer.sample.run import LEAST_SIZE, MOST_R_HAT, Ending, Look, Run, new_run, until_precise, warm_up
 from mlnlite.infer.sample.worlds import can_differ, start_worlds
 from mlnlite.model.formulas import Expression
 
@@ -133,9 +133,7 @@ def _run(
     rng = np.random.default_rng(effort.seed)
     worlds = start_worlds(network, effort.n_chains, rng)[:, factors.atom]
     run = new_run(network, factors, worlds, asked, sampler, rng)
-    for chain, even in zip(run.chains, run.even, strict=True):
-        if not deadline.is_over:
-            run.draws(chain, _WARM_UP, run.watched.atoms, even)
+    warm_up(run, _WARM_UP, deadline)
     return run, *until_precise(run, effort.precision, deadline)
 
 

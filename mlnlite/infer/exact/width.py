@@ -1,0 +1,62 @@
+"""A proof that no elimination order is narrow enough, much cheaper than looking for one in a large tangle.
+
+In every order some variable is eliminated first, with a table over it and its neighbours; so the smallest such table is
+a lower bound, of the graph and of each of its minors. Contracting the variable of the smallest table into its neighbour
+of the smallest makes a denser minor (Bodlaender, Koster & Wolle 2006, contraction degeneracy; here with the number of
+values of each variable, of two that are contracted the smaller).
+"""
+
+from __future__ import annotations
+
+from heapq import heapify, heappop, heappush
+
+
+def unavoidable_table(adjacent: list[set[int]], bits: list[float], limit: float) -> tuple[int, float] | None:
+    """A table past a limit that every order makes, or a larger one.
+
+    Args:
+        adjacent: the neighbours of each variable; used up.
+        bits: log2 number of values of each variable; changed.
+        limit: log2 number of entries.
+
+    Returns:
+        Number of variables and log2 number of entries of the smallest table of a minor; None if none passes the limit.
+    """
+    weight = [bits[v] + sum(bits[u] for u in near) for v, near in enumerate(adjacent)]
+    heap = [(w, v) for v, w in enumerate(weight)]
+    heapify(heap)
+    gone = [False] * len(adjacent)
+    while heap:
+        w, v = heappop(heap)
+        if gone[v] or w != weight[v]:
+            continue
+        if w > limit:
+            return len(adjacent[v]) + 1, w
+        gone[v] = True
+        for u in _contract(adjacent, bits, weight, v):
+            heappush(heap, (weight[u], u))
+    return None
+
+
+def _contract(adjacent: list[set[int]], bits: list[float], weight: list[float], v: int) -> set[int]:
+    """Contracts a variable into a neighbour; returns the variables whose table changes."""
+    near = adjacent[v]
+    if not near:
+        return near
+    into = min(near, key=lambda u: (weight[u], u))
+    for u in near:
+        adjacent[u].remove(v)
+        weight[u] -= bits[v]
+    for u in near - adjacent[into]:
+        if u != into:
+            adjacent[u].add(into)
+            adjacent[into].add(u)
+            weight[u] += bits[into]
+            weight[into] += bits[u]
+    less = bits[into] - min(bits[into], bits[v])
+    if less == 0:
+        return near
+    bits[into] -= less
+    for u in (into, *adjacent[into]):
+        weight[u] -= less
+    return near | adjacent[into]
