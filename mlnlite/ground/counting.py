@@ -75,7 +75,7 @@ def _used(source: Source) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class _State:
+class State:
     """The state as digits: of each proposition its place value, and the truth at each state."""
 
     plain: tuple[Proposition, ...]
@@ -94,7 +94,7 @@ def counting_groups(source: Source, rows: Relation) -> list[Group] | None:
     Raises:
         LimitReached: if the formula has too many states.
     """
-    state = _state(source)
+    state = state_of(source)
     n_rows = len(next(iter(rows.values()))) if rows else 1
     step = max(1, AT_ONCE // max(1, len(source.formula.atoms)))
     found = []
@@ -109,7 +109,12 @@ def counting_groups(source: Source, rows: Relation) -> list[Group] | None:
     return found
 
 
-def _state(source: Source) -> _State:
+def state_of(source: Source) -> State:
+    """The digits of a formula with counted propositions.
+
+    Raises:
+        LimitReached: if it has too many states.
+    """
     body = source.formula.body
     plain: tuple[Proposition, ...] = (
         *(AtomRef(i) for i in sorted(atoms_in(body)) if i >= 0),
@@ -125,10 +130,10 @@ def _state(source: Source) -> _State:
         n_true = np.arange(len(counted.cases) + 1)
         truth = truth.take(((n_true >= counted.low) & (n_true <= counted.high)).astype(int), axis=len(plain) + i)
     steps = [prod(sizes[i + 1 :]) for i in range(len(sizes))]
-    return _State(plain, tuple(steps[: len(plain)]), tuple(steps[len(plain) :]), truth.ravel().astype(np.int64))
+    return State(plain, tuple(steps[: len(plain)]), tuple(steps[len(plain) :]), truth.ravel().astype(np.int64))
 
 
-def _columns(source: Source, state: _State, rows: Relation, n: int) -> tuple[Int64, Int64, Int64] | None:
+def _columns(source: Source, state: State, rows: Relation, n: int) -> tuple[Int64, Int64, Int64] | None:
     """Unknown atoms of each row, their steps, and the state where all are false; None as `counting_groups`."""
     numbers = _numbers(source, rows, n)
     columns = [*_plain_columns(source, state, rows, numbers)]
@@ -148,14 +153,14 @@ def _columns(source: Source, state: _State, rows: Relation, n: int) -> tuple[Int
 
 
 def _plain_columns(
-    source: Source, state: _State, rows: Relation, numbers: Int64
+    source: Source, state: State, rows: Relation, numbers: Int64
 ) -> Iterator[tuple[Int64, Int64, Int64]]:
     yield np.empty((len(numbers), 0), np.int64), np.empty((len(numbers), 0), np.int64), np.zeros(len(numbers), np.int64)
     for proposition, step in zip(state.plain, state.plain_steps, strict=True):
         if isinstance(proposition, AtomRef):
             atoms = numbers[:, [proposition.index]]
         else:
-            atoms = np.where(_holds(proposition, rows, len(numbers)), KNOWN_TRUE, KNOWN_FALSE)[:, None]
+            atoms = np.where(holds(proposition, rows, len(numbers)), KNOWN_TRUE, KNOWN_FALSE)[:, None]
         yield _moves(atoms, np.ones(atoms.shape, np.bool_), step)
 
 
@@ -189,7 +194,7 @@ def _case_literal(case: Expression, rows: Relation, numbers: Int64) -> tuple[Int
         if isinstance(p, AtomRef):
             code += np.clip(-numbers[:, p.index], 0, 2).astype(np.int16)
         else:
-            code += np.where(_holds(p, rows, n), np.int16(-KNOWN_TRUE), np.int16(-KNOWN_FALSE))
+            code += np.where(holds(p, rows, n), np.int16(-KNOWN_TRUE), np.int16(-KNOWN_FALSE))
     atoms, sign = np.empty(n, np.int64), np.ones(n, np.bool_)
     for value in np.flatnonzero(np.bincount(code)).tolist():
         mine = code == value
@@ -209,7 +214,9 @@ def _case_literal(case: Expression, rows: Relation, numbers: Int64) -> tuple[Int
     return atoms[:, None], sign[:, None]
 
 
-def _holds(equality: Equal, rows: Relation, n: int) -> Bool:
+def holds(equality: Equal, rows: Relation, n: int) -> Bool:
+    """Whether an equality holds in each of `n` bindings."""
+
     def value(term: Argument) -> Int64 | int:
         at = side(term)
         return rows[at] if isinstance(at, str) else at

@@ -182,9 +182,14 @@ def counting_source(index: int, template: Template, evidence: Evidence) -> Sourc
     assert template.rows is not None
     if not any(v.bound for v in template.formula.variables):
         return None
+    source = counted_source(index, template, evidence)
+    return source if source.counted and len(source.formula.atoms) > NARROW else None
+
+
+def counted_source(index: int, template: Template, evidence: Evidence) -> Source:
+    """As `source_of`, with quantifiers counted."""
+    assert template.rows is not None
     formula, counted = with_counted(template.formula, _constants(evidence), _comparisons(evidence))
-    if not counted or len(formula.atoms) <= NARROW:
-        return None
     return Source(formula, evidence, template.keys, f"rows:{index}", len(template.rows), None, counted)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mlnlite.engines.choose import engine_for
 from mlnlite.engines.plan import Engine, Run
 from mlnlite.errors import LimitReached, QueryMistake
-from mlnlite.ground.ground import row_tables
+from mlnlite.ground.ground import blamed, row_tables
 from mlnlite.ground.tables import tables_of
 from mlnlite.infer.deadline import Deadline
 from mlnlite.learn.data.choices import listed
@@ -21,7 +21,7 @@ from mlnlite.learn.data.merge import Listed, merged
 from mlnlite.learn.data.wide import Wide
 from mlnlite.learn.learned import How
 from mlnlite.learn.objectives.exact import Labels, compiled
-from mlnlite.learn.objectives.quantified import ground_entries, ranges_widely, without_weights
+from mlnlite.learn.objectives.quantified import counted_entries, ranges_widely, without_weights
 from mlnlite.learn.optimise.newton import Optimum
 from mlnlite.learn.optimise.problem import Problem, problem_of
 from mlnlite.learn.optimise.solve import Solution, solve, solve_hierarchical, start_of
@@ -162,13 +162,8 @@ def pseudo_listed(model: Model, databases: Evidence, targets: frozenset[str], en
     others = {i: t for i, t in enumerate(model.templates) if i not in wide}
     found = entries(others, first, evidence, load, targets)
     for i, template in wide.items():
-        try:
-            more = ground_entries(model, i, databases, targets, engine)
-        except LimitReached as reason:  # an open quantified part: written out, if that is possible
-            try:
-                more = entries({i: template}, first, evidence, load, targets)
-            except LimitReached:
-                raise reason from None
+        with blamed(template):
+            more = counted_entries(model, i, databases, targets, engine)
         found = {name: [*parts, *more[name]] for name, parts in found.items()}
     every = {name: joined(parts, int(first[-1])) for name, parts in found.items()}
     return listed(every, evidence, int(first[-1]))

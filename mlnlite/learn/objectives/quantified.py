@@ -1,27 +1,29 @@
-"""Formulas whose quantifiers range over many constants: ground, not written out. Databases in, entries out."""
+"""Formulas whose quantifiers range over many constants: counted, not written out. Databases in, entries out."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from math import prod
 
 import numpy as np
 
-from mlnlite.engines.plan import Engine
-from mlnlite.ground.ground import ground
-from mlnlite.ground.network import Network
+from mlnlite.engines.choose import engine_for
+from mlnlite.engines.plan import Engine, Relation
+from mlnlite.ground.compile import Source
+from mlnlite.ground.counting import counting_plan
+from mlnlite.ground.ground import counted_source, row_tables
+from mlnlite.ground.tables import completed, tables_of
 from mlnlite.learn.data.content import content
 from mlnlite.learn.data.counts import Entries
 from mlnlite.learn.data.flips import flips
-from mlnlite.learn.objectives.exact import conditions
 from mlnlite.model.evidence import Evidence
+from mlnlite.model.facts import closed
 from mlnlite.model.model import Model
 from mlnlite.model.read import one_database
 from mlnlite.model.templates import Template
 
 _FEW, _MOST = 4, 20_000_000
-"""Cases of a quantifier up to which joins write it out; bindings of all variables up to which it is ground."""
+"""Cases of a quantifier up to which joins write it out; bindings of all variables up to which they are listed."""
 
 
 def ranges_widely(template: Template, databases: Evidence) -> bool:
@@ -37,10 +39,10 @@ def without_weights(model: Model) -> Model:
     return replace(model, templates=tuple(zero))
 
 
-def ground_entries(
+def counted_entries(
     model: Model, number: int, databases: Evidence, targets: frozenset[str], engine: Engine | None
 ) -> dict[str, list[Entries]]:
-    """What each atom of the target predicates changes; all other predicates are known, as the definition has it.
+    """What each atom of the target predicates changes.
 
     Args:
         model: expanded; weights do not matter.
@@ -50,21 +52,22 @@ def ground_entries(
         engine: what runs the plans.
 
     Raises:
-        LimitReached: what is counted is a formula of several unknown atoms.
+        LimitReached: what is counted has too many atoms, or the formula too many states.
     """
     found: dict[str, list[Entries]] = {name: [] for name in targets}
-    networks: dict[tuple[object, ...], Network] = {}
+    template = model.templates[number]
     first = sum(len(t.weights) for t in model.templates[:number])
-    used = {atom.predicate for atom in model.templates[number].formula.atoms}
-    model = without_weights(replace(model, templates=(model.templates[number],)))
-    for name, i in product(sorted(targets & used), range(databases.n_databases)):
-        given, data = conditions(databases, i, frozenset([name]), frozenset()), one_database(databases, i)
-        same = name, *content(given, given.predicates)
-        if same not in networks:
-            networks[same] = ground(model, given, engine=engine)
-        network, facts = networks[same], data.facts[name]
-        true = data.atom_number(name, facts.arguments[facts.truth])
-        changes = flips(network, np.isin(network.atoms, true))
-        database = np.full(len(changes.atom), i, np.int64)
-        found[name].append(Entries(database, network.atoms[changes.atom], first + changes.weight, changes.change))
+    used = {atom.predicate for atom in template.formula.atoms}
+    sources: dict[tuple[bytes, ...], tuple[Source, Relation]] = {}
+    for i in range(databases.n_databases):
+        data = completed(closed(one_database(databases, i), databases.predicates))
+        constants = content(data, ())
+        if constants not in sources:
+            source = counted_source(number, template, data)
+            run = (engine or engine_for()).load({**tables_of(data), **row_tables(model)})
+            sources[constants] = source, run(counting_plan(source, ({},)).plan)
+        for name in sorted(targets & used):
+            changes = flips(*sources[constants], data, name)
+            database = np.full(len(changes.atom), i, np.int64)
+            found[name].append(Entries(database, changes.atom, first + changes.row, changes.change))
     return found
