@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count, filterfalse
-from typing import ClassVar, TypeVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, EvidenceMistake, did_you_mean, in_order
+from mlnlite.model.constants import Numbering, blocks
 from mlnlite.model.coverage import same_number
 from mlnlite.model.derived import compared, verify_constants
 from mlnlite.model.evidence import Evidence, Facts, SoftFacts
 from mlnlite.model.model import Model
-from mlnlite.model.order import blocks, ordered
+from mlnlite.model.order import Part, ordered
 from mlnlite.model.soft import SoftColumns, place, soft_mistakes
 from mlnlite.model.symbols import Predicate, Type
 from mlnlite.source import Source, Span
-from mlnlite.syntax.coded import Coded
 from mlnlite.syntax.facts import EvidenceProgram, FactTable
-
-Number = TypeVar("Number", bound=np.generic)
 
 MOST_MISTAKES = 50
 """Mistakes reported for one predicate of one file; more are counted."""
@@ -32,48 +29,23 @@ MOST_MISTAKES = 50
 class _Columns:
     """Facts of one predicate, before they are sorted; `file` and `offset` say where each stands."""
 
-    database: list[NDArray[np.int32]] = field(default_factory=list)
-    arguments: list[NDArray[np.int32]] = field(default_factory=list)
-    truth: list[NDArray[np.bool_]] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
     file: list[int] = field(default_factory=list)
-    offset: list[NDArray[np.int64]] = field(default_factory=list)
+    offset: list[NDArray[np.integer]] = field(default_factory=list)
 
 
 @dataclass(slots=True)
 class _Reading:
-    """What is known so far; `met`: for the constants of a column, taken as a type, their ids, or -1."""
+    """What is known so far."""
 
     predicates: Mapping[str, Predicate]
-    types: dict[str, dict[str, int]]
+    types: dict[str, Numbering]
     sources: list[Source] = field(default_factory=list)
-    declared: list[tuple[int, int, str, list[int]]] = field(default_factory=list)
+    declared: list[tuple[int, int, str, Sequence[int]]] = field(default_factory=list)
     columns: dict[str, _Columns] = field(default_factory=dict)
     soft: dict[str, SoftColumns] = field(default_factory=dict)
     cuts: dict[tuple[str, int], tuple[float, ...]] = field(default_factory=dict)
     mistakes: list[Diagnostic] = field(default_factory=list)
-    met: dict[tuple[str, int], tuple[Sequence[str], NDArray[np.int32]]] = field(default_factory=dict)
-
-    def ids(self, type_name: str, names: Sequence[str]) -> list[int]:
-        """Ids of constants, new ones for those not seen before."""
-        index = self.types[type_name]
-        index.update(zip(dict.fromkeys(filterfalse(index.__contains__, names)), count(len(index)), strict=False))
-        return list(map(index.__getitem__, names))
-
-    def ids_of(self, type_name: str, column: Coded) -> NDArray[np.int32]:
-        """The id of the constant of each row."""
-        _, ids = self.met.setdefault(
-            (type_name, id(column.names)), (column.names, np.full(len(column.names), -1, np.int32))
-        )
-        found = np.empty(len(column.codes), np.int32)
-        for block in blocks(len(found)):
-            codes = column.codes[block]
-            found[block] = ids[codes]
-            if found[block].min() < 0:
-                new, first = np.unique(codes[found[block] < 0], return_index=True)
-                new = new[np.argsort(first)]
-                ids[new] = self.ids(type_name, [column.names[i] for i in new.tolist()])
-                found[block] = ids[codes]
-        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +79,7 @@ def check_evidence(
     Raises:
         EvidenceMistake: with every mistake in all files.
     """
-    types = {name: dict(t.index) for name, t in model.types.items()}
-    reading = _Reading(model.predicates, types)
+    reading = _Reading(model.predicates, {name: Numbering(list(t.constants)) for name, t in model.types.items()})
     first = 0
     for program in programs:
         if together and program.n_databases > 1:
@@ -120,7 +91,7 @@ def check_evidence(
     tabled = any(isinstance(p, TableFacts) for p in programs)
     n_databases = 1 if together else first + tabled
     facts = {name: _sorted(name, reading) for name in model.predicates}
-    result_types = {name: Type(name, tuple(index)) for name, index in reading.types.items()}
+    result_types = {name: Type(name, tuple(numbering.names)) for name, numbering in reading.types.items()}
     reading.mistakes += verify_constants(model, result_types)
     if reading.mistakes:
         raise EvidenceMistake(in_order(reading.mistakes))
@@ -155,7 +126,7 @@ def _two_names(reading: _Reading, types: Mapping[str, Type]) -> Iterator[Diagnos
 def _mention_of(constant: int, type_name: str, reading: _Reading) -> Span | None:
     """The first fact in which a constant stands, if it stands in one that is certain."""
     for name, columns in reading.columns.items():
-        arguments = _joined(columns.arguments)
+        arguments = np.concatenate([part.arguments() for part in columns.parts])
         for i, t in enumerate(reading.predicates[name].types):
             rows = np.flatnonzero(arguments[:, i] == constant)
             if t == type_name and len(rows):
@@ -219,7 +190,7 @@ def _read_file(program: EvidenceProgram | TableFacts, first: int, reading: _Read
             message = f"no predicate uses the type {declaration.name}"
             reading.mistakes.append(Diagnostic("E301", message, declaration.span, hint, expected="a type of the model"))
             continue
-        ids = reading.ids(declaration.name, [c.name for c in declaration.constants])
+        ids = reading.types[declaration.name].ids([c.name for c in declaration.constants])
         reading.declared.append((first, first + program.n_databases, declaration.name, ids))
     for table in program.facts:
         _read_table(table, first, reading)
@@ -243,19 +214,16 @@ def _read_table(table: FactTable, first: int, reading: _Reading) -> None:
     if isinstance(predicate, tuple):
         _each(table, *predicate, reading)
         return
-    arguments = np.empty((len(table.truth), predicate.arity), np.int32)
-    for i, (type_name, column) in enumerate(zip(predicate.types, table.columns, strict=True)):
-        arguments[:, i] = reading.ids_of(type_name, column)
+    ids = tuple(reading.types[t].ids_of(column) for t, column in zip(predicate.types, table.columns, strict=True))
     file, database = len(reading.sources), table.database + np.int32(first) if first else table.database
     reading.sources.append(table.source)
+    part = Part(database, tuple(column.codes for column in table.columns), ids, table.truth)
     if table.weight is not None:
         soft = reading.soft.setdefault(predicate.name, SoftColumns())
-        soft.add(database, arguments, table.weight, file, table.offset)
+        soft.add(database, part.arguments(), table.weight, file, table.offset)
         return
     known = reading.columns.setdefault(predicate.name, _Columns())
-    known.database.append(database)
-    known.arguments.append(arguments)
-    known.truth.append(table.truth)
+    known.parts.append(part)
     known.file.append(file)
     known.offset.append(table.offset)
 
@@ -264,7 +232,7 @@ def _mention(program: TableFacts, first: int, reading: _Reading) -> None:
     """Notes the constants of all rows of a table, those that say nothing included, and cut points."""
     predicate = reading.predicates[program.facts[0].predicate]
     for type_name, names in zip(predicate.types, program.constants, strict=True):
-        reading.declared.append((first, first + 1, type_name, reading.ids(type_name, names)))
+        reading.declared.append((first, first + 1, type_name, reading.types[type_name].ids(names)))
     reading.cuts.update({(predicate.name, i): points for i, points in program.cuts.items()})
 
 
@@ -295,9 +263,7 @@ def _sorted(name: str, reading: _Reading) -> Facts:
     columns = reading.columns.get(name)
     if columns is None:
         return Facts(np.empty(0, np.int32), np.empty((0, predicate.arity), np.int32), np.empty(0, np.bool_))
-    sizes = [len(reading.types[t]) for t in predicate.types]
-    read = Facts(_joined(columns.database), _joined(columns.arguments), _joined(columns.truth))
-    facts, again, order = ordered(read, sizes)
+    facts, again, order = ordered(columns.parts, [len(reading.types[t].names) for t in predicate.types])
     where = _Places(columns, order)
     for i in np.flatnonzero(again & (facts.truth != np.roll(facts.truth, 1)))[:MOST_MISTAKES].tolist():
         first, second = where.spans([i - 1, i], reading.sources)
@@ -314,10 +280,6 @@ def _sorted(name: str, reading: _Reading) -> Facts:
             message = f"this is a second value; the first is at {first.place}"
             reading.mistakes.append(Diagnostic("E305", message, second, f"of {predicate}, {some} true"))
     return facts
-
-
-def _joined(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 @dataclass(frozen=True, slots=True)

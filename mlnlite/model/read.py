@@ -20,9 +20,10 @@ from mlnlite.model.model import Model
 from mlnlite.model.soft import of_databases
 from mlnlite.model.table import Table, read_mapping
 from mlnlite.source import Source
-from mlnlite.syntax.evidence import parse_evidence
+from mlnlite.syntax.evidence import BULK, parse_evidence
 from mlnlite.syntax.facts import EvidenceProgram
 from mlnlite.syntax.files import read_source
+from mlnlite.syntax.letters import open_source
 from mlnlite.syntax.parse import parse_what_can_be_read
 from mlnlite.syntax.tree import AnyDialect, Program
 
@@ -88,7 +89,8 @@ def read_evidence(*paths: Path, model: Model, together: bool = False) -> Evidenc
         SyntaxMistake: if a text is not in the language.
         EvidenceMistake: if facts do not fit the model or each other.
     """
-    texts, tables = [], []
+    texts: list[Source] = []
+    tables: list[tuple[str, Table]] = []
     for path in (fspath(p) for p in paths):
         name, equals, source = path.partition("=")
         if equals and name.isidentifier():
@@ -96,7 +98,7 @@ def read_evidence(*paths: Path, model: Model, together: bool = False) -> Evidenc
         elif path.endswith(".toml"):
             tables += read_mapping(FilePath(path))
         else:
-            texts.append(read_source(path))
+            texts.append(open_source(path, BULK))
     return evidence_of(texts, model, together=together, tables=tables)
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.syntax import bulk_kernel as kernel
+from mlnlite.syntax.letters import Letters
 from mlnlite.syntax.rows import Piece, Progress, log_odds
 
-CHUNK = 1 << 22
-"""Characters that are read at once."""
-FACTS = 1 << 15
+FACTS = 1 << 13
 """Facts that are gathered before they become columns."""
 WORDS = 1 << 12
 """Words for which there is room at first."""
@@ -39,102 +37,91 @@ class Vocabulary:
 
     def texts(self) -> list[str]:
         """All of them."""
-        begins = self.words.begins[: self.n + 1].tolist()
-        letters = self.words.letters[: begins[-1]].tobytes().decode()
-        return [letters[i:j] for i, j in pairwise(begins)]
+        letters = self.words.letters[: self.words.begins[self.n]]
+        return letters.tobytes().decode().split("\n")[:-1]
 
     def text(self, number: int) -> str:
         """One of them."""
         begin, end = self.words.begins[number : number + 2]
-        return self.words.letters[begin:end].tobytes().decode()
+        return self.words.letters[begin : end - 1].tobytes().decode()
 
 
 def read_bulk(
-    text: str, start: int, end: int, progress: Progress, vocabulary: Vocabulary
+    chunks: Iterable[Letters], start: int, progress: Progress, vocabulary: Vocabulary
 ) -> Iterator[Piece | tuple[int, int]]:
-    """The facts of a stretch of text that stand on lines of their own, piece by piece.
+    """The facts of a text that stand on lines of their own, piece by piece.
 
     Args:
-        text: facts, without comments.
-        start: begin of the stretch.
-        end: its end.
+        chunks: the text, some lines at a time, each as in `letters_of`.
+        start: where it stands in its source, in characters.
         progress: changes as the text is read.
         vocabulary: gains the words.
 
     Yields:
         Facts; or start and end of lines that are left, when `progress` is theirs.
     """
-    found = _room()
-    state, size = np.zeros(kernel.N_STATE, np.int64), CHUNK
-    while start < end:
-        stop, larger = min(text.find("\n", start + size) + 1 or len(text), end), CHUNK
-        chunk = _bytes(text[start:stop])
-        state[[kernel.POSITION, kernel.SKIPPED, kernel.FIRST_LEFT]] = 0, 0, -1
-        while (reason := _read(chunk, found, progress, state)) != kernel.END:
-            left, behind = int(state[kernel.FIRST_LEFT]), int(state[kernel.POSITION] - state[kernel.SKIPPED])
-            if reason == kernel.FULL:
-                yield from _pieces(chunk, found, start, state, vocabulary)
-            elif reason == kernel.LEFT_LAST and stop < end:  # they may go on in the next chunk
-                stop, larger = start + left, CHUNK if left else 2 * size
-                break
-            else:
-                state[kernel.FIRST_LEFT] = -1
-                yield start + left, min(start + behind, end)
-        yield from _pieces(chunk, found, start, state, vocabulary)
-        start, size = stop, larger
+    found, state = _room(), np.zeros(kernel.N_STATE, np.int64)
+    for text in map(_text, chunks):
+        state[[kernel.POSITION, kernel.SKIPPED, kernel.FIRST_LEFT]], reason = (0, 0, -1), kernel.FULL
+        while reason != kernel.END:
+            state[[kernel.DATABASE, kernel.SEPARATOR]] = progress.database, progress.separator
+            reason = kernel.read_lines(text, found, state)
+            progress.database, progress.separator = int(state[kernel.DATABASE]), bool(state[kernel.SEPARATOR])
+            yield from _pieces(text, found, start, state, vocabulary)
+            behind = start + int(state[kernel.POSITION] - state[kernel.SKIPPED])
+            if reason == kernel.LEFT:
+                left, state[kernel.FIRST_LEFT] = int(state[kernel.FIRST_LEFT]), -1
+                yield start + left, behind
+        start = behind
+
+
+def _text(letters: Letters) -> kernel.Text:
+    letters.flags.writeable = False
+    return kernel.Text(letters, np.ndarray((len(letters) - 7,), "<u8", letters, strides=(1,)))
 
 
 def _room() -> kernel.Found:
     n = kernel.WIDEST + 4 * FACTS
-    rows = np.empty((FACTS, kernel.N_COLUMNS), np.int32)
-    return kernel.Found(rows, np.empty(n, np.uint64), np.empty(n, np.int32), np.empty(n, np.int32))
-
-
-def _bytes(text: str) -> kernel.Text:
-    letters = np.frombuffer(text.encode() + b"\n" + bytes(kernel.PADDING), np.uint8)
-    return kernel.Text(letters, np.ndarray((len(letters) - 7,), "<u8", letters, strides=(1,)))
-
-
-def _read(chunk: kernel.Text, found: kernel.Found, progress: Progress, state: NDArray[np.int64]) -> int:
-    state[[kernel.DATABASE, kernel.SEPARATOR]] = progress.database, progress.separator
-    reason: int = kernel.read_lines(chunk, found, state)
-    progress.database, progress.separator = int(state[kernel.DATABASE]), bool(state[kernel.SEPARATOR])
-    return reason
+    rows = np.empty((FACTS, kernel.N_COLUMNS), np.int64)
+    return kernel.Found(rows, np.empty(n, np.uint64), np.empty(n, np.int64), np.empty(n, np.int32))
 
 
 def _pieces(
-    chunk: kernel.Text, found: kernel.Found, start: int, state: NDArray[np.int64], vocabulary: Vocabulary
+    text: kernel.Text, found: kernel.Found, start: int, state: NDArray[np.int64], vocabulary: Vocabulary
 ) -> Iterator[Piece]:
     """The facts found so far, one piece for each predicate, number of arguments, and kind of number in front."""
-    numbers = _numbers(chunk, found, int(state[kernel.N_WORDS]), vocabulary)
+    if not state[kernel.N_FACTS]:
+        return
+    numbers = _numbers(text, found, int(state[kernel.N_WORDS]), vocabulary)
     rows = found.rows[: state[kernel.N_FACTS]]
     first, arity, chance = rows[:, kernel.FIRST], rows[:, kernel.ARITY], rows[:, kernel.CHANCE]
     for mine in _alike((numbers[first].astype(np.int64) * kernel.WIDEST + arity) * kernel.N_CHANCES + chance):
-        words, n, kind = first[mine], int(arity[mine[0]]), int(chance[mine[0]])
+        facts = rows[mine]
+        words, n, kind = facts[:, kernel.FIRST], int(facts[0, kernel.ARITY]), int(facts[0, kernel.CHANCE])
         yield Piece(
             vocabulary.text(numbers[words[0]]),
             tuple(numbers[words + 1 + i] for i in range(n)),
-            rows[mine, kernel.TRUTH].astype(np.bool_),
-            rows[mine, kernel.IN_DATABASE],
-            start + rows[mine, kernel.BEGIN].astype(np.int64),
-            _weights(numbers[words + 1 + n], vocabulary) if kind == kernel.NUMBER else _weight(kind, len(mine)),
+            facts[:, kernel.TRUTH].astype(np.bool_),
+            facts[:, kernel.IN_DATABASE].astype(np.int32),
+            (start + facts[:, kernel.BEGIN]).astype(np.int32 if start < 1 << 30 else np.int64),
+            _weights(numbers[words + 1 + n], vocabulary) if kind == kernel.NUMBER else _weight(kind, len(facts)),
         )
     state[[kernel.N_FACTS, kernel.N_WORDS]] = 0
 
 
-def _alike(keys: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def _alike(keys: NDArray[np.int64]) -> list[NDArray[np.int64]] | list[slice]:
     """The rows of each key."""
-    if (keys == keys[:1]).all():
-        return [np.arange(len(keys))] if len(keys) else []
+    if (keys == keys[0]).all():
+        return [slice(None)]
     order = np.argsort(keys, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(keys[order])) + 1)
 
 
-def _numbers(chunk: kernel.Text, found: kernel.Found, n: int, vocabulary: Vocabulary) -> NDArray[np.int32]:
+def _numbers(text: kernel.Text, found: kernel.Found, n: int, vocabulary: Vocabulary) -> NDArray[np.int32]:
     """The numbers of the first words found."""
     numbers, done = np.empty(n, np.int32), 0
     while done < n:
-        done, vocabulary.n = kernel.number_words(chunk, found, done, numbers, vocabulary.words, vocabulary.n)
+        done, vocabulary.n = kernel.number_words(text, found, done, numbers, vocabulary.words, vocabulary.n)
         if done < n:
             vocabulary.words = _with_room(vocabulary.words)
     return numbers

@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.compiled import compiled, compiled_part
+from mlnlite.syntax.letters import PADDING
 
-LONGEST = 256
+LONGEST = PADDING // 2
 """Bytes of the longest word that is read here."""
-PADDING = 2 * LONGEST
-"""Zeros behind a text."""
 WIDEST = 64
 """Words of the longest fact that is read here."""
-END, FULL, LEFT, LEFT_LAST = range(4)
-"""Why reading stops: all is read; no room for more facts; lines are left that are no such facts, or are the last."""
+END, FULL, LEFT = range(3)
+"""Why reading stops: all is read; no room for more facts; lines are left that are no such facts."""
 POSITION, SKIPPED, DATABASE, SEPARATOR, FIRST_LEFT, N_FACTS, N_WORDS, N_STATE = range(8)
 """The state: the next byte; how many bytes before it go on with a character; the database; whether `---` was read last;
 the character from which on lines are left, or -1; how many facts there are, and how many words these have."""
@@ -48,12 +47,12 @@ class Found(NamedTuple):
         rows: shape (n, N_COLUMNS).
         keys: of each word the first eight bytes, or a mixture of all.
         begins: of each word.
-        lengths: of each word, in bytes.
+        lengths: of each word, in bytes; or if it is one of the words before it, its distance to that, negative.
     """
 
-    rows: NDArray[np.int32]
+    rows: NDArray[np.int64]
     keys: NDArray[np.uint64]
-    begins: NDArray[np.int32]
+    begins: NDArray[np.int64]
     lengths: NDArray[np.int32]
 
 
@@ -61,8 +60,8 @@ class Words(NamedTuple):
     """All words so far, each once.
 
     Attributes:
-        letters: the bytes of all of them.
-        begins: shape (n,), where each begins, and where the last one ends.
+        letters: the bytes of all of them, a newline behind each.
+        begins: shape (n,), where each begins, and where the next one will.
         table: shape (2 n, 2), n a power of 2, an open hash table: keys, and lengths and numbers, 0 where it is free.
     """
 
@@ -76,7 +75,7 @@ _PLAIN, _INSIDE, _JOINS, _OUTSIDE = range(4)
 _KIND = np.full(256, _OUTSIDE, np.uint8)
 _KIND[list(b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_")] = _PLAIN
 _KIND[list(b"'$~")], _KIND[list(b"-.:;/")] = _INSIDE, _JOINS
-_NEWLINE, _TAB, _RETURN, _FEED, _BLANK, _QUOTE, _BACKSLASH, _DELETE = b'\n\t\r\f "\\\x7f'
+_NEWLINE, _TAB, _BLANK, _QUOTE, _BACKSLASH, _SLASH, _DELETE = b'\n\t "\\/\x7f'
 _DASH, _DOT, _ZERO, _NINE, _NOT, _QUESTION, _EQUAL, _COMMA, _OPENS, _CLOSES = b"-.09!?=,()"
 _SPREAD, _HIGH = np.uint64(0x9E3779B97F4A7C15), np.uint64(29)
 _MASKS = np.array([(1 << (8 * n)) - 1 for n in range(9)], np.uint64)
@@ -93,21 +92,27 @@ def read_lines(text, found, state):
         found: the facts, which become more.
         state: shape (N_STATE,), where reading is, brought up to date.
     """
-    while state[POSITION] < len(text.letters) - PADDING:
-        if state[N_FACTS] == len(found.rows) or state[N_WORDS] + WIDEST > len(found.keys):
-            return FULL
-        at = _behind_blanks(text.letters, state[POSITION])
-        behind = _read_fact(text, at, found, state)
+    letters, rows, room, end = text.letters, found.rows, len(found.keys) - WIDEST, len(text.letters) - PADDING
+    at, n_facts, n_words = state[POSITION], state[N_FACTS], state[N_WORDS]
+    reason, back = END, n_words + 1
+    while at < end and reason == END:
+        if n_facts == len(rows) or n_words > room:
+            reason = FULL
+            break
+        row = rows[n_facts]
+        behind = _read_fact(text, _behind_blanks(letters, at), found, row, n_words, back)
         if behind < 0:
-            _pass_line(text.letters, at, state)
+            at = _pass_line(letters, at, state)
         elif state[FIRST_LEFT] >= 0:
-            return LEFT
+            reason = LEFT
         else:
-            row = found.rows[state[N_FACTS]]
-            state[N_WORDS] += row[ARITY] + 1 + (row[CHANCE] == NUMBER)
-            state[N_FACTS] += 1
-            state[SEPARATOR], state[POSITION] = 0, behind
-    return LEFT_LAST if state[FIRST_LEFT] >= 0 else END
+            row[BEGIN], row[IN_DATABASE] = row[BEGIN] - state[SKIPPED], state[DATABASE]
+            back = row[ARITY] + 1 + (row[CHANCE] == NUMBER)
+            n_words += back
+            n_facts += 1
+            state[SEPARATOR], at = 0, behind
+    state[POSITION], state[N_FACTS], state[N_WORDS] = at, n_facts, n_words
+    return LEFT if reason == END and state[FIRST_LEFT] >= 0 else reason
 
 
 @compiled
@@ -125,24 +130,29 @@ def number_words(text, found, done, numbers, words, n_known):
     Returns:
         How many have numbers now, fewer than n if there is no room for new words, and how many words are known.
     """
+    letters, keys, begins, lengths = text.letters, found.keys, found.begins, found.lengths
     table, last, shift = words.table, len(words.table) - 1, _shift(words.table)
     for i in range(done, len(numbers)):
-        key, begin, length = found.keys[i], found.begins[i], found.lengths[i]
+        key, begin, length = keys[i], begins[i], lengths[i]
+        if length < 0:
+            numbers[i] = numbers[i + length]
+            continue
         slot, number = np.int64((key * _SPREAD) >> shift), -1
         while number < 0 and table[slot, 1]:
             if np.uint64(table[slot, 0]) == key and table[slot, 1] >> _BITS == length:
                 number = (table[slot, 1] & _NUMBER) - 1
-                if length > 8 and not _is(text.letters, begin, length, words, number):
+                if length > 8 and not _is(letters, begin, length, words, number):
                     number = -1
             slot = (slot + 1) & last
         if number < 0:
             number, at = n_known, words.begins[n_known]
-            if n_known + 1 == len(words.begins) or at + length > len(words.letters):
+            if n_known + 1 == len(words.begins) or at + length >= len(words.letters):
                 return i, n_known
             table[slot, 0], table[slot, 1] = np.int64(key), (length << _BITS) + number + 1
             for k in range(length):
-                words.letters[at + k] = text.letters[begin + k]
-            words.begins[number + 1] = at + length
+                words.letters[at + k] = letters[begin + k]
+            words.letters[at + length] = _NEWLINE
+            words.begins[number + 1] = at + length + 1
             n_known += 1
         numbers[i] = number
     return len(numbers), n_known
@@ -164,37 +174,38 @@ def enter(old, table):
 
 
 @compiled_part
-def _read_fact(text, at, found, state):
+def _read_fact(text, at, found, row, first, back):
     """Reads the fact that begins at a byte, if its line is one; returns the begin of the next line, or -1."""
-    letters, row, first = text.letters, found.rows[state[N_FACTS]], state[N_WORDS]
-    begin, chance, front, front_end, is_value = at, CERTAIN, at, at, False
+    letters = text.letters
+    begin, chance, front_end, is_value = at, CERTAIN, at, False
     if letters[at] == _NOT or letters[at] == _QUESTION:
         chance = UNKNOWN if letters[at] == _QUESTION else CERTAIN
         at += 1
-    elif letters[_behind_name(letters, at)] != _OPENS:
+    stop = _behind_name(letters, at)
+    if letters[stop] != _OPENS and at == begin:
         front_end = _behind_term(letters, at)
         at = _behind_blanks(letters, front_end)
-        is_value = front_end > front and letters[at] == _EQUAL
+        is_value = front_end > begin and letters[at] == _EQUAL
         if is_value:
             at = _behind_blanks(letters, at + 1)
-        elif at > front_end > front and _is_chance(letters, front, front_end):
+        elif at > front_end > begin and _is_chance(letters, begin, front_end):
             chance = NUMBER
         else:
             return -1
-    stop = _behind_name(letters, at)
+        stop = _behind_name(letters, at)
     if stop == at or letters[stop] != _OPENS or _ZERO <= letters[at] <= _NINE or stop - at > LONGEST:
         return -1
-    _note(text, at, stop, found, first)
-    at, arity = _read_arguments(text, stop, found, first + 1)
-    if front_end > front:
-        _note(text, front, front_end, found, first + 1 + arity)
-    row[BEGIN], row[FIRST], row[ARITY] = begin - state[SKIPPED], first, arity + is_value
-    row[TRUTH], row[CHANCE], row[IN_DATABASE] = letters[begin] != _NOT, chance, state[DATABASE]
+    _note(text, at, stop, found, first, back)
+    at, arity = _read_arguments(text, stop, found, first + 1, back)
+    if front_end > begin:
+        _note(text, begin, front_end, found, first + 1 + arity, back)
+    row[BEGIN], row[FIRST], row[ARITY] = begin, first, arity + is_value
+    row[TRUTH], row[CHANCE] = letters[begin] != _NOT, chance
     return at
 
 
 @compiled_part
-def _read_arguments(text, at, found, first):
+def _read_arguments(text, at, found, first, back):
     """Reads the arguments behind a bracket; returns the begin of the next line, or -1, and how many there are."""
     letters, n, sign = text.letters, 0, _COMMA
     while sign == _COMMA and n < WIDEST - 2:
@@ -202,45 +213,49 @@ def _read_arguments(text, at, found, first):
         stop = _behind_term(letters, at)
         if stop == at:
             return -1, n
-        _note(text, at, stop, found, first + n)
+        _note(text, at, stop, found, first + n, back)
         n += 1
         at = _behind_blanks(letters, stop)
         sign = letters[at]
-    at += sign == _CLOSES
-    while letters[at] in (_BLANK, _TAB, _RETURN):
-        at += 1
+    at = _behind_comment(letters, _behind_blanks(letters, at + 1))
     return at + 1 if sign == _CLOSES and letters[at] == _NEWLINE else -1, n
 
 
 @compiled_part
-def _note(text, at, stop, found, index):
-    """Notes a word, without its quotes."""
+def _note(text, at, stop, found, index, back):
+    """Notes a word, without its quotes; or that it is the one `back` words before, as it often is in a list."""
     quoted = text.letters[at] == _QUOTE
     at += quoted
     length = stop - quoted - at
     key = text.blocks[at] & _MASKS[min(length, 8)]
     for i in range(8, length, 8):
         key = (key ^ (key >> _HIGH)) * _SPREAD + (text.blocks[at + i] & _MASKS[min(length - i, 8)])
+    before = index - back
+    if length <= 8 and before >= 0 and found.keys[before] == key and found.lengths[before] <= 8:
+        length = -back
     found.keys[index], found.begins[index], found.lengths[index] = key, at, length
 
 
 @compiled_part
 def _pass_line(letters, at, state):
-    """Passes over a line that is no such fact: blank, `---`, or one that is left with those that are left already."""
+    """Passes over a line that is no such fact: blank, `---`, or one that is left with those that are left already.
+
+    Returns the begin of the next line.
+    """
+    begin, at = at, _behind_blanks(letters, at)
     dashes = letters[at] == _DASH and letters[at + 1] == _DASH and letters[at + 2] == _DASH
-    blank, skipped = True, 0
-    at += 3 * dashes
+    at = _behind_comment(letters, _behind_blanks(letters, at + 3 * dashes))
+    if letters[at] == _NEWLINE:
+        if state[FIRST_LEFT] < 0 and dashes:
+            state[DATABASE] += 1
+            state[SEPARATOR] = 1
+        return at + 1
+    if state[FIRST_LEFT] < 0:
+        state[FIRST_LEFT] = begin - state[SKIPPED]
     while letters[at] != _NEWLINE:
-        blank = blank and letters[at] in (_BLANK, _TAB, _RETURN, _FEED)
-        skipped += (letters[at] & 0xC0) == 0x80
+        state[SKIPPED] += (letters[at] & 0xC0) == 0x80
         at += 1
-    if state[FIRST_LEFT] < 0 and blank and dashes:
-        state[DATABASE] += 1
-        state[SEPARATOR] = 1
-    elif state[FIRST_LEFT] < 0 and not blank:
-        state[FIRST_LEFT] = state[POSITION] - state[SKIPPED]
-    state[SKIPPED] += skipped
-    state[POSITION] = at + 1
+    return at + 1
 
 
 # --- words: where each ends is where it begins if there is none
@@ -251,6 +266,17 @@ def _behind_blanks(letters, at):
     while letters[at] in (_BLANK, _TAB):
         at += 1
     return at
+
+
+@compiled_part
+def _behind_comment(letters, at):
+    """The end of the line, if a comment of plain letters begins here."""
+    if letters[at] != _SLASH or letters[at + 1] != _SLASH:
+        return at
+    begin = at
+    while _BLANK <= letters[at] < _DELETE or letters[at] == _TAB:
+        at += 1
+    return at if letters[at] == _NEWLINE else begin
 
 
 @compiled_part
@@ -272,8 +298,9 @@ def _behind_term(letters, at):
     at += letters[at] == _DASH
     if _KIND[letters[at]] != _PLAIN:
         return begin
-    while _KIND[letters[at]] < _JOINS or (_KIND[letters[at]] == _JOINS and _KIND[letters[at + 1]] == _PLAIN):
-        at += 1
+    at = _behind_name(letters, at)
+    while _KIND[letters[at]] != _OUTSIDE and (_KIND[letters[at]] == _INSIDE or _KIND[letters[at + 1]] == _PLAIN):
+        at = _behind_name(letters, at + 1)
     return at if at <= last else begin
 
 

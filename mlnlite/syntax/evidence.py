@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from mlnlite.syntax.build import Fact
 from mlnlite.syntax.facts import EvidenceProgram
 from mlnlite.syntax.grammar import parse_node
 from mlnlite.syntax.includes import ANY_INCLUDE, File, load
+from mlnlite.syntax.letters import LargeFile, Letters, letters_of
 from mlnlite.syntax.lines import split_facts
 from mlnlite.syntax.messages import mistake
 from mlnlite.syntax.place import Place
@@ -66,40 +68,50 @@ def parse_evidence(source: Source) -> EvidenceProgram:
         SyntaxMistake: with every mistake in the file.
     """
     reading = _Reading()
-    file = load(source)
-    reading.mistakes += file.mistakes
-    _read_file(file, reading)
+    start = _read_plain(source, reading) if isinstance(source, LargeFile) else 0
+    if start is not None:
+        file = load(source)
+        reading.mistakes += file.mistakes
+        _read_file(file, reading, start)
     if reading.mistakes:
         raise SyntaxMistake(reading.mistakes)
     n_databases = reading.progress.database + (not reading.progress.separator)
     tables = tuple(reading.rows.tables(reading.vocabulary.texts() if reading.vocabulary else ()))
-    return EvidenceProgram(tables, tuple(reading.types), n_databases, Span(source, 0, len(source.text)))
+    return EvidenceProgram(tables, tuple(reading.types), n_databases, Span(source, 0, 1))
 
 
-def _read_file(file: File, reading: _Reading) -> None:
+def _read_plain(source: LargeFile, reading: _Reading) -> int | None:
+    """Facts at the begin of a large file, which need no text; where other lines begin, if there are any."""
+    return next((rest[0] for rest in _read_bulk(source, source.chunks(), 0, reading)), None)
+
+
+def _read_file(file: File, reading: _Reading, begin: int = 0) -> None:
     """Large files by compiled code; what that leaves, and small files, by a pattern; what that leaves, by the grammar.
 
     An included file may have databases of its own, so it is read between what stands before and after it.
     """
     text = file.code.text
-    for start, end in pairwise([0, *sorted(file.included), len(text)]):
-        first = text.find("\n", start) + 1 if start in file.included else start
+    for start, end in pairwise([begin, *sorted(i for i in file.included if i >= begin), len(text)]):
+        first = (text.find("\n", start) + 1 or end) if start in file.included else start
         if end - first < BULK:
             _read_lines(file, start, end, reading)
-        else:
-            _read_lines(file, start, first, reading)
-            _read_large(file, first, end, reading)
+            continue
+        _read_lines(file, start, first, reading)
+        for left, behind in _read_bulk(file.code.source, [letters_of(text[first:end])], first, reading):
+            if len(reading.mistakes) <= MAX_MISTAKES:
+                _read_lines(file, left, min(behind, end), reading)
 
 
-def _read_large(file: File, start: int, end: int, reading: _Reading) -> None:
+def _read_bulk(source: Source, chunks: Iterable[Letters], start: int, reading: _Reading) -> Iterator[tuple[int, int]]:
+    """Facts by compiled code; start and end of the lines that it leaves."""
     from mlnlite.syntax.bulk import Vocabulary, read_bulk
 
     reading.vocabulary = reading.vocabulary or Vocabulary()
-    for found in read_bulk(file.code.text, start, end, reading.progress, reading.vocabulary):
+    for found in read_bulk(chunks, start, reading.progress, reading.vocabulary):
         if isinstance(found, Piece):
-            reading.rows.add_piece(file.code.source, found)
-        elif len(reading.mistakes) <= MAX_MISTAKES:
-            _read_lines(file, *found, reading)
+            reading.rows.add_piece(source, found)
+        else:
+            yield found
 
 
 def _read_lines(file: File, start: int, end: int, reading: _Reading) -> None:

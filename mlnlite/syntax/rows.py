@@ -15,6 +15,9 @@ from mlnlite.syntax.facts import FactTable
 
 Number = TypeVar("Number", bound=np.generic)
 
+LARGE = 1 << 20
+"""So many facts about a predicate make a table of their own."""
+
 
 @dataclass(slots=True)
 class Progress:
@@ -62,10 +65,19 @@ _Key = tuple[Source, str, int, bool]
 
 @dataclass(slots=True)
 class Rows:
-    """All facts so far, by table: those that came in pieces, and those that came one by one."""
+    """All facts so far, by table.
+
+    Attributes:
+        pieces: facts that came in pieces.
+        single: facts that came one by one.
+        large: pieces that became one, so that their memory serves others.
+        n: how many facts there are in `pieces`.
+    """
 
     pieces: dict[_Key, list[Piece]] = field(default_factory=dict)
     single: dict[_Key, _Single] = field(default_factory=dict)
+    large: list[tuple[_Key, Piece]] = field(default_factory=list)
+    n: dict[_Key, int] = field(default_factory=dict)
 
     def add(self, source: Source, fact: tuple[str, Sequence[str]], truth: bool | float, place: tuple[int, int]) -> None:
         """Adds one fact.
@@ -92,7 +104,12 @@ class Rows:
     def add_piece(self, source: Source, piece: Piece) -> None:
         """Adds many facts."""
         key = source, piece.predicate, len(piece.words), piece.weight is not None
-        self.pieces.setdefault(key, []).append(piece)
+        pieces = self.pieces.setdefault(key, [])
+        pieces.append(piece)
+        self.n[key] = self.n.get(key, 0) + len(piece.truth)
+        if self.n[key] >= LARGE:
+            self.large.append((key, _whole(pieces)))
+            self.n[key] = 0
 
     def tables(self, words: Sequence[str] = ()) -> list[FactTable]:
         """All facts, as tables in the order of their sources and first facts; `words`: those that pieces number."""
@@ -101,7 +118,8 @@ class Rows:
         for key, single in self.single.items():
             self.pieces[key].append(_piece(key, single, numbers))
         names = list(numbers) if numbers else words
-        tables = [_table(key, pieces, names) for key, pieces in self.pieces.items()]
+        rest = [(key, _whole(pieces)) for key, pieces in self.pieces.items() if pieces]
+        tables = [_table(key, piece, names) for key, piece in [*self.large, *rest]]
         return sorted(tables, key=lambda table: (sources[id(table.source)], table.offset[0]))
 
 
@@ -119,24 +137,23 @@ def _piece(key: _Key, rows: _Single, numbers: dict[str, int]) -> Piece:
     )
 
 
-def _table(key: _Key, pieces: list[Piece], names: Sequence[str]) -> FactTable:
-    """Facts as a table, in their order; `names`: of the words. Columns of pieces go when they are part of the table."""
-    source, predicate, arity, soft = key
-    words = [[piece.words[i] for piece in pieces] for i in range(arity)]
+def _table(key: _Key, piece: Piece, names: Sequence[str]) -> FactTable:
+    columns = tuple(Coded(names, words) for words in piece.words)
+    return FactTable(key[1], columns, piece.truth, piece.database, piece.weight, piece.offset, key[0])
+
+
+def _whole(pieces: list[Piece]) -> Piece:
+    """Pieces as one, facts in their order; the pieces go when they are part of it."""
+    words = [[piece.words[i] for piece in pieces] for i in range(len(pieces[0].words))]
     truth, database = [piece.truth for piece in pieces], [piece.database for piece in pieces]
     offset, weight = [piece.offset for piece in pieces], [piece.weight for piece in pieces if piece.weight is not None]
+    predicate = pieces[0].predicate
     pieces.clear()
     offsets = _joined(offset)
     order = np.argsort(offsets) if (offsets[1:] < offsets[:-1]).any() else slice(None)
-    return FactTable(
-        predicate,
-        tuple(Coded(names, _joined(column)[order]) for column in words),
-        _joined(truth)[order],
-        _joined(database)[order],
-        _joined(weight)[order] if soft else None,
-        offsets[order],
-        source,
-    )
+    columns = tuple(_joined(column)[order] for column in words)
+    weights = _joined(weight)[order] if weight else None
+    return Piece(predicate, columns, _joined(truth)[order], _joined(database)[order], offsets[order], weights)
 
 
 def _joined(parts: list[NDArray[Number]]) -> NDArray[Number]:

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mlnlite as ml
-from mlnlite.model.evidence import Facts
-from mlnlite.model.order import ordered
+from mlnlite.model.order import Part, ordered
 
 rows = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 3), st.integers(0, 4), st.booleans()), max_size=30)
 
@@ -17,8 +16,12 @@ rows = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 3), st.integers(0, 4
 @given(rows)
 def test_order(facts):
     database, first, second = (np.array([f[i] for f in facts], np.int32) for i in range(3))
-    arguments, truth = np.column_stack([first, second]), np.array([f[3] for f in facts], np.bool_)
-    given, expected = Facts(database, arguments, truth), sorted(facts)
+    truth, ids = np.array([f[3] for f in facts], np.bool_), np.arange(5, dtype=np.int32)
+    columns, expected = (database, first, second, truth), sorted(facts)
+    given = [
+        Part(d, (4 - x, y), (ids[::-1], ids), t)
+        for d, x, y, t in zip(*(np.split(c, [len(c) // 3]) for c in columns), strict=True)
+    ]
     repeated = [i > 0 and fact[:3] == expected[i - 1][:3] for i, fact in enumerate(expected)]
     small, again, order = ordered(given, [4, 5])
     assert list(zip(small.database, *small.arguments.T, small.truth, strict=True)) == expected
@@ -28,7 +31,6 @@ def test_order(facts):
     assert [f[:3] for f in zip(large.database, *large.arguments.T, strict=True)] == [f[:3] for f in expected]
     assert [facts[i][:3] for i in order()] == [f[:3] for f in expected]
     assert again.tolist() == repeated
-    assert ordered(small, [4, 5])[0] is small
 
 
 def test_places_of_contradictions():

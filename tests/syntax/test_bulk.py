@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 from mlnlite.errors import SyntaxMistake
 from mlnlite.source import Source
-from mlnlite.syntax import bulk, evidence
+from mlnlite.syntax import bulk, evidence, letters, rows
 from mlnlite.syntax import bulk_kernel as kernel
 from mlnlite.syntax.evidence import parse_evidence
+from mlnlite.syntax.files import read_source
+from mlnlite.syntax.letters import LargeFile
 
 LINES = (
     "Friends(Anna, Bob)",
@@ -62,61 +64,82 @@ LINES = (
     "P(A",
     "P(A\tB)",
     "P(\tA)\r",
+    "P(A) // a comment, plain",
+    "  // a comment",
+    "--- // a comment",
+    "P(B) // Ünal",
+    "/* P(A)",
+    "P(C) */",
+    "P(a/b, c) //",
+    "P(a//b, c)",
+    '#include "x.db"',
     "=",
     "\x01P(A)",
     "Unknown(" + ", ".join("abcdefgh") + ")",
 )
 
 
-def read(text):
-    """What a text means, or its mistakes."""
+def read(source):
+    """What a source means, or its mistakes."""
     try:
-        program = parse_evidence(Source("e.db", text))
+        program = parse_evidence(source)
     except SyntaxMistake as error:
         return sorted(str(d) for d in error.diagnostics)
     return program, [table.offset.tolist() for table in program.facts]
 
 
-def compare(text, size):
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return str(tmp_path_factory.mktemp("bulk") / "e.db")
+
+
+def compare(text, path):
+    """By a pattern; by compiled code; as a large file, which is read as bytes until a line needs the grammar."""
+    with open(path, "w", newline="") as file:
+        file.write(text)
+    sources = [Source(path, text)] + ([read_source(path), LargeFile(path)] if text.strip() else [])
     with pytest.MonkeyPatch.context() as patch:
+        for module, name, value in (
+            (bulk, "FACTS", 5),
+            (bulk, "WORDS", 2),
+            (letters, "CHUNK", 40),
+            (rows, "LARGE", 10**9),
+        ):
+            patch.setattr(module, name, value)
         patch.setattr(evidence, "BULK", 10**9)
-        expected = read(text)
+        expected = [read(source) for source in sources]
         patch.setattr(evidence, "BULK", 0)
-        patch.setattr(bulk, "CHUNK", size)
-        patch.setattr(bulk, "FACTS", 5)
-        patch.setattr(bulk, "WORDS", 2)
-        found = read(text)
-    assert found == expected
+        assert [read(source) for source in sources] == expected
+    assert expected[1:2] == expected[2:]
 
 
 @settings(max_examples=150, deadline=None)
-@given(
-    st.lists(st.sampled_from(LINES), max_size=12), st.sampled_from(["\n", "\n\n", "\r\n"]), st.sampled_from([40, 10**6])
-)
-@example(["0.0 Smokes(Bob)", "0.0 Smokes(Bob)", "person = {Eva,", "  Fritz}"], "\n", 40)
-@example(["---", "person = {Eva,", "  Fritz}", "Rain"], "\n", 40)
-@example(list(LINES), "\n", 10**6)
-def test_any_lines(lines, newline, size):
-    compare(newline.join(lines), size)
+@given(st.lists(st.sampled_from(LINES), max_size=12), st.sampled_from(["\n", "\n\n", "\r\n"]))
+@example(["0.0 Smokes(Bob)", "0.0 Smokes(Bob)", "person = {Eva,", "  Fritz}"], "\n")
+@example(["---", "person = {Eva,", "  Fritz}", "Rain"], "\n")
+@example(["Rain", "P(A) // é", "P(A) // plain", "// a comment", "--- // and another"], "\n")
+@example(list(LINES), "\n")
+def test_any_lines(path, lines, newline):
+    compare(newline.join(lines), path)
 
 
 @settings(deadline=None)
-@given(st.text(st.sampled_from('PQab1.-"(),=!?0 \n{}#/*:é'), max_size=60), st.sampled_from([10, 10**6]))
-def test_any_text(text, size):
-    compare(text, size)
+@given(st.text(st.sampled_from('PQab1.-"(),=!?0 \n{}#/*:é'), max_size=60))
+def test_any_text(path, text):
+    compare(text, path)
 
 
 @settings(deadline=None)
 @given(st.lists(st.sampled_from(LINES), min_size=1, max_size=8), st.data())
-def test_spoilt_lines(lines, data):
+def test_spoilt_lines(path, lines, data):
     text = "\n".join(lines)
     for _ in range(3):
         at = data.draw(st.integers(0, len(text)))
         text = text[:at] + data.draw(st.text('P1.-"(),=!?0 \n\\{}#/é', max_size=2)) + text[at + 1 :]
-    compare(text, 40)
+    compare(text, path)
 
 
-def test_many_facts():
+def test_many_facts(path):
     rng = np.random.default_rng(0)
     lines = [f"Friends(P{a}, P{b})" for a, b in rng.integers(0, 3000, (20_000, 2))]
     lines[7] = "person = {\n Eva,\n Fritz}"
@@ -124,7 +147,7 @@ def test_many_facts():
     lines[11] = "---"
     lines[13:15] = ["// a comment", "0.25 Smokes(P1)  /* and another"]
     lines[16] = "*/ Smokes(P2)"
-    compare("\n".join(lines), 1 << 12)
+    compare("\n".join(lines), path)
 
 
 def test_included_databases_shift_those_after_them(tmp_path):
@@ -139,16 +162,13 @@ def test_included_databases_shift_those_after_them(tmp_path):
     assert program.facts[1].database.tolist() == [0, 1, 1, 2, 2, 3]
 
 
-def test_words_with_one_key_stay_apart():
+def test_words_with_one_key_stay_apart(path):
     """Words of more than eight bytes have a mixture of all as their key; here are two with the same."""
     words = ("00114963and_more", "second_0Fe_BPo3j")
-    chunk = bulk._bytes("".join(f"P({word})\n" for word in words))
-    keys = np.zeros(99, np.uint64)
-    found = kernel.Found(
-        np.zeros((9, kernel.N_COLUMNS), np.int32), keys, np.zeros(99, np.int32), np.zeros(99, np.int32)
-    )
+    text = bulk._text(letters.letters_of("".join(f"P({word})\n" for word in words)))
+    found = bulk._room()
     state = np.zeros(kernel.N_STATE, np.int64)
     state[kernel.FIRST_LEFT] = -1
-    assert kernel.read_lines(chunk, found, state) == kernel.END
-    assert keys[1] == keys[3]
-    compare("".join(f"P({word})\n" for word in words * 3), 40)
+    assert kernel.read_lines(text, found, state) == kernel.END
+    assert found.keys[1] == found.keys[3]
+    compare("".join(f"P({word})\n" for word in words * 3), path)
