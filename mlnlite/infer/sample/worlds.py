@@ -11,9 +11,13 @@ from pysat.solvers import Solver
 from mlnlite.ground.network import Bool, Int64, Network
 from mlnlite.infer.conflict import block_clauses, contradiction, hard_clauses
 
+_MANY_TRUE = 0.95
+
 
 def start_worlds(network: Network, n: int, rng: np.random.Generator) -> Bool:
-    """Worlds far apart from each other.
+    """Worlds far apart from each other: in the first nearly all atoms are true, in the last nearly none.
+
+    So chains that stay in what they start in do not agree by chance.
 
     Args:
         network: what was ground.
@@ -21,18 +25,20 @@ def start_worlds(network: Network, n: int, rng: np.random.Generator) -> Bool:
         rng: where their chance comes from.
 
     Returns:
-        Shape (n, n_atoms), random where nothing is hard.
+        Shape (n, n_atoms), random but for that where nothing is hard.
 
     Raises:
         Contradiction: there is no world.
     """
+    shares = np.linspace(_MANY_TRUE, 1 - _MANY_TRUE, n)
     if not np.isposinf(network.weights).any():
-        values = (rng.random((n, network.n_variables)) * network.cardinality).astype(np.int64)
+        chance = rng.random((n, network.n_variables))
+        values = np.where(network.block, chance * network.cardinality, chance < shares[:, None]).astype(np.int64)
         return np.asarray(values[:, network.variable] == network.value)
     worlds = np.zeros((n, network.n_atoms), np.bool_)
     with _solver(network) as solver:
-        for world in worlds:
-            signs = np.where(rng.random(network.n_atoms) < 0.5, 1, -1)
+        for world, share in zip(worlds, shares.tolist(), strict=True):
+            signs = np.where(rng.random(network.n_atoms) < share, 1, -1)
             solver.set_phases((signs * np.arange(1, network.n_atoms + 1)).tolist())
             if not solver.solve():
                 raise contradiction(network)
