@@ -60,7 +60,7 @@ class NumpyEngine:
 
     def load(self, tables: Tables) -> Run:
         """What runs plans over these tables."""
-        store = _Store(tables, self.most, {})
+        store = _Store(tables, self.most, {}, {})
 
         def run(plan: Plan) -> Relation:
             rows = _run(plan, store)
@@ -81,7 +81,7 @@ class _Rows:
         """Some of the rows; None for all."""
         if index is None:
             return self
-        return _Rows({name: c.take(index, mode="clip") for name, c in self.columns.items()}, len(index))
+        return _Rows({name: _taken(c, index) for name, c in self.columns.items()}, len(index))
 
     def keep(self, mask: Bool) -> _Rows:
         """The rows of a mask. As long as these are most, the others stay, for fewer copies."""
@@ -110,16 +110,23 @@ class _Rows:
         return self.columns[side] if isinstance(side, str) else np.broadcast_to(kind(side), self.n)
 
 
+def _taken(column: Column, index: Int64) -> Column:
+    """The values at some places; `take` is faster, but copies the whole of a column that is not contiguous."""
+    return column.take(index, mode="clip") if column.flags.c_contiguous else column[index]
+
+
 @dataclass(frozen=True, slots=True)
 class _Store:
-    """The stored tables, how many rows a join may have, and dictionaries of relations that rows are looked up in.
+    """The stored tables, how many rows a join may have, and what was found before.
 
-    Parts of one plan look into the same relations, so these are made once for all of them.
+    Parts of one plan look into the same relations, so dictionaries of these are made once for all of them, and plans
+    for what a few facts touch look for the same few values of a column.
     """
 
     tables: Tables
     most: int | None
     dictionaries: dict[tuple[Plan, tuple[str, ...]], Dictionary]
+    ranges: dict[tuple[int, int, int], tuple[Column, Int64]]
 
     def look_up(self, relation: Plan, by: tuple[str, ...], values: Column | None, others: list[Column]) -> _Found:
         """The numbers that a relation's rows with some columns have (None: 0), for other rows; and that of no row."""
@@ -127,13 +134,36 @@ class _Store:
         if known is None:
             rows = _run(relation, self).whole()
             rows = _Rows({**rows.columns, "": np.zeros(rows.n, np.int8) if values is None else values}, rows.n)
-            few = _near(rows, by, others)
+            few = self.near(rows, by, others)
             known = dictionary([few.columns[c] for c in by], few.columns[""], len(others[0]))
             if few is rows:
                 if len(self.dictionaries) >= MOST_DICTIONARIES:
                     self.dictionaries.clear()
                 self.dictionaries[relation, by] = known
         return known.find(others), known.absent
+
+    def near(self, rows: _Rows, by: Sequence[str], others: list[Column]) -> _Rows:
+        """Rows without many that match none of others, if these are few: values are outside of their range."""
+        if rows.n < MANY * max(len(others[0]), 1):
+            return rows
+        if not len(others[0]):
+            return rows.take(np.empty(0, np.int64))
+        *rest, (name, other) = zip(by, others, strict=True)  # the last column of a table is seldom all the same
+        index = self.in_range(rows.columns[name], int(other.min()), int(other.max()))
+        for name, other in rest:
+            column = rows.columns[name][index]
+            index = index[(column >= other.min()) & (column <= other.max())]
+        return rows.take(index)
+
+    def in_range(self, column: Column, low: int, high: int) -> Int64:
+        """Where a column has values from `low` to `high`."""
+        key = (id(column), low, high)
+        if key not in self.ranges:
+            if len(self.ranges) >= MOST_DICTIONARIES:
+                self.ranges.clear()
+            inside = column == low if low == high else (column >= low) & (column <= high)
+            self.ranges[key] = column, np.flatnonzero(inside)  # the column is kept, so that its id stays its own
+        return self.ranges[key][1]
 
 
 def _run(plan: Plan, store: _Store) -> _Rows:
@@ -143,7 +173,7 @@ def _run(plan: Plan, store: _Store) -> _Rows:
         case One():
             return _Rows({}, 1)
         case Join(left, right):
-            return _join(_run(left, store).whole(), _run(right, store).whole(), store.most)
+            return _join(_run(left, store).whole(), _run(right, store).whole(), store)
         case AntiJoin(left, right):
             return _antijoin(_run(left, store), right, store)
         case Where(source, left_side, operator, right_side):
@@ -202,13 +232,13 @@ def _shared(left: _Rows, right: _Rows) -> list[str]:
     return [c for c in right.columns if c in left.columns]
 
 
-def _join(left: _Rows, right: _Rows, most: int | None) -> _Rows:
-    shared = _shared(left, right)
+def _join(left: _Rows, right: _Rows, store: _Store) -> _Rows:
+    shared, most = _shared(left, right), store.most
     if not shared:
         _verify(left.n * right.n, most)
         left_index = None if right.n == 1 else np.repeat(np.arange(left.n), right.n)
         return _paired(left, left_index, right, np.tile(np.arange(right.n), left.n))
-    left, right = _near(left, shared, right.values(shared)), _near(right, shared, left.values(shared))
+    left, right = store.near(left, shared, right.values(shared)), store.near(right, shared, left.values(shared))
     sides = [left.values(shared), right.values(shared)]
     packing = packing_of(sides[1])
     stored, _ = packing.keys(sides[1])
@@ -218,18 +248,6 @@ def _join(left: _Rows, right: _Rows, most: int | None) -> _Rows:
     packing = packing_of(sides[0])
     index = _matches(sides[1], packing.keys(sides[0])[0], packing, most)
     return _paired(right, index[0], left, index[1])
-
-
-def _near(rows: _Rows, by: Sequence[str], others: list[Column]) -> _Rows:
-    """The rows without many that match none of some other rows, if these are few: values are outside of their range."""
-    if rows.n < MANY * max(len(others[0]), 1):
-        return rows
-    if not len(others[0]):
-        return rows.take(np.empty(0, np.int64))
-    inside = [
-        (rows.columns[c] >= other.min()) & (rows.columns[c] <= other.max()) for c, other in zip(by, others, strict=True)
-    ]
-    return rows.take(np.flatnonzero(np.logical_and.reduce(inside)))
 
 
 def _matches(others: list[Column], stored: Column, packing: Packing, most: int | None) -> tuple[Int64 | None, Int64]:

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite.ground.blocks import Index, Piece, blocks_of
+from mlnlite.ground.blocks import Piece, blocks_of
 from mlnlite.ground.compile import strides
+from mlnlite.ground.index import DENSEST
 from mlnlite.ground.network import Network
 from mlnlite.ground.numbers import atoms_numbered, known_numbers, numbers_of
-from mlnlite.model.change import find
+from mlnlite.model.change import find, places_of
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Predicate
@@ -66,20 +67,18 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
     listed = distinct(
         [numbers_of(asked, evidence), *(a for part in parts for p in part.pieces for a in p.atoms)], known
     )
-    atoms, block = with_blocks(atoms_numbered(listed, evidence), evidence)
-    index = index_in(numbers_of(atoms, evidence))
-    variable, value, cardinality, is_block = variables_of(atoms, block, evidence)
+    variables = variables_of(atoms_numbered(listed, evidence), evidence)
     first = np.cumsum([0, *(len(part.decided_true) for part in parts)])
     pieces = [(p, offset) for part, offset in zip(parts, first.tolist(), strict=False) for p in part.pieces]
-    blocks = blocks_of(pieces, index, len(atoms))
+    blocks = blocks_of(pieces, variables.atoms, evidence)
     network = Network(
         model=model,
         evidence=evidence,
-        atoms=atoms,
-        variable=variable,
-        value=value,
-        cardinality=cardinality,
-        block=is_block,
+        atoms=variables.atoms,
+        variable=variables.variable,
+        value=variables.value,
+        cardinality=variables.cardinality,
+        block=variables.block,
         clauses=blocks.clauses,
         tables=blocks.tables,
         weights=np.concatenate([np.empty(0), *(t.weights for t in model.templates)]),
@@ -88,19 +87,12 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         n_groundings=np.concatenate([np.empty(0, np.int64), *(part.n_groundings for part in parts)]),
         counts=blocks.counts,
     )
-    _lock(network)
+    for array in (network.weights, network.decided_true, network.n_groundings):
+        array.setflags(write=False)
     return network
 
 
-def _lock(network: Network) -> None:
-    for name in ("atoms", "variable", "value", "cardinality", "block", "weights", "decided_true", "n_groundings"):
-        getattr(network, name).setflags(write=False)
-
-
 # --- atoms and variables
-
-DENSEST = 1 << 28
-"""Atom numbers that a look-up table may span."""
 
 
 def distinct(numbers: Sequence[Int64], others: Sequence[Int64] = ()) -> Int64:
@@ -128,19 +120,6 @@ def distinct(numbers: Sequence[Int64], others: Sequence[Int64] = ()) -> Int64:
     return np.flatnonzero(seen) + low
 
 
-def index_in(atoms: Int64) -> Index:
-    """The function that gives the place of atoms in the rising array `atoms`."""
-    span = int(atoms[-1] - atoms[0]) + 1 if len(atoms) else 0
-    if not len(atoms) or span > min(DENSEST, 16 * len(atoms) + 4096):
-        return lambda numbers: np.searchsorted(atoms, numbers).astype(np.int32)
-    low = atoms[0]
-    if span == len(atoms):
-        return lambda numbers: (numbers - low).astype(np.int32, copy=False)
-    place = np.zeros(span, np.int32)
-    place[atoms - low] = np.arange(len(atoms), dtype=np.int32)
-    return lambda numbers: place.take(numbers - low if low else numbers, mode="clip")
-
-
 def known_atoms(predicate: Predicate, evidence: Evidence) -> Int64:
     """Numbers of the atoms of a predicate that are facts, rising."""
     return evidence.atom_number(predicate.name, evidence.facts[predicate.name].arguments)
@@ -155,7 +134,7 @@ def unknown(atoms: Int64, evidence: Evidence) -> Int64:
         if predicate.closed:
             keep[mine] = False
         elif mine.any():
-            keep[mine] = ~find(known_atoms(predicate, evidence), atoms[mine])[1]
+            keep[mine] = ~places_of(evidence, predicate.name, atoms[mine])[1]
     return atoms[keep]
 
 
@@ -165,7 +144,7 @@ def atom_range(predicate: Predicate, evidence: Evidence) -> tuple[int, int]:
     return low, low + prod(evidence.sizes(predicate.name))
 
 
-def with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
+def _with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
     """The atoms and the other open atoms of their blocks, and for each the number of its block's first atom, or -1."""
     blocks = np.full(len(atoms), -1, np.int64)
     if all(p.value is None for p in evidence.predicates.values()):
@@ -192,7 +171,27 @@ def _first_of_block(atoms: Int64, low: int, stride: int, size: int) -> Int64:
     return np.asarray(atoms - value * stride, np.int64)
 
 
-def variables_of(atoms: Int64, block: Int64, evidence: Evidence) -> tuple[Int32, Int32, Int32, NDArray[np.bool_]]:
+@dataclass(frozen=True, slots=True)
+class Variables:
+    """The atoms of a network and its variables; see `Network`."""
+
+    atoms: Int64
+    variable: Int32
+    value: Int32
+    cardinality: Int32
+    block: NDArray[np.bool_]
+
+
+def variables_of(atoms: Int64, evidence: Evidence) -> Variables:
+    """The variables of unknown atoms (rising numbers), to which the other open atoms of their blocks come."""
+    atoms, block = _with_blocks(atoms, evidence)
+    found = Variables(atoms, *_variables(atoms, block, evidence))
+    for array in (found.atoms, found.variable, found.value, found.cardinality, found.block):
+        array.setflags(write=False)
+    return found
+
+
+def _variables(atoms: Int64, block: Int64, evidence: Evidence) -> tuple[Int32, Int32, Int32, NDArray[np.bool_]]:
     """Variable and value of each atom; cardinality of each variable and whether it is a block."""
     if (block < 0).all():
         single = np.arange(len(atoms), dtype=np.int32)

@@ -10,19 +10,19 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mlnlite.ground.index import Index, index_in
 from mlnlite.ground.merge import Group, code_of, merged, merged_codes
 from mlnlite.ground.network import Clauses, Counts, Tables
+from mlnlite.ground.numbers import numbers_of
 from mlnlite.ground.residual import ClauseShape, CountShape, TableShape
 from mlnlite.ground.states import counts_of
+from mlnlite.model.evidence import Evidence
 
 S = TypeVar("S")
 K = TypeVar("K")
 
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
-
-Index: TypeAlias = Callable[[Int64], Int32]
-"""Gives the index in the network of atoms by their numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +55,16 @@ class Blocks:
     counts: tuple[Counts, ...]
 
 
-def blocks_of(pieces: Weighted, index: Index, n_atoms: int) -> Blocks:
+def blocks_of(pieces: Weighted, atoms: Int64, evidence: Evidence) -> Blocks:
     """The factors that pieces are.
 
     Args:
         pieces: of all templates, one template after the other.
-        index: of atoms in the network.
-        n_atoms: of the network.
+        atoms: of the network, as `Evidence.atom_number` has them, rising.
+        evidence: what they are of.
     """
+    n_atoms = len(atoms)
+    index = index_in(numbers_of(atoms, evidence), sum(len(p.row) for p, _ in pieces))
     clauses, tables, counts = [], [], []
     for (k, negated), mine in sorted(_of_kind(pieces, ClauseShape, lambda s: (len(s.atoms), s.negated)).items()):
         codes = _groups(mine, lambda p: _codes(p, index))

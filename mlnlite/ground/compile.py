@@ -53,7 +53,9 @@ class Source:
         counted: the counted propositions of the formula.
         excluded: ends the names of the tables of facts that literals must not contradict; others only generate.
         touching: indices of atoms, the last of which is to be among those in `P.touched`, and the others not; so plans
-            list the groundings that some atoms touch, each for the first atom of the formula that is one of them.
+            list the groundings that some atoms touch, each for the first atom of the formula that is one of them. What
+            is known of the touched ones stands in tables of their own, `P.touched.true` and so on.
+        state: ends the names of all tables of facts.
     """
 
     formula: Formula
@@ -65,6 +67,7 @@ class Source:
     counted: tuple[Counted, ...] = ()
     excluded: str = ""
     touching: tuple[int, ...] = ()
+    state: str = ""
 
     @property
     def tabled(self) -> bool:
@@ -75,9 +78,16 @@ class Source:
         """How a scan of a table of the atom's predicate binds its columns."""
         return (self.world, *map(side, schema.arguments))
 
+    def table(self, index: int, kind: str) -> str:
+        """Name of the table of what is known (`true`, `false`, or `known`) of the predicate of an atom."""
+        touched = TOUCHED if self.touching and index == self.touching[-1] else ""
+        return f"{self.formula.atoms[index].predicate}{touched}.{kind}{self.state}"
+
     def n_known(self, schema: AtomSchema, truth: bool) -> int:
         """Number of facts about the predicate of an atom."""
-        return int(np.count_nonzero(self.evidence.facts[schema.predicate].truth == truth))
+        known = self.evidence.facts[schema.predicate].truth
+        n_true = int(np.count_nonzero(known))
+        return n_true if truth else len(known) - n_true
 
     def is_closed(self, schema: AtomSchema) -> bool:
         """Whether every atom of the predicate is known."""
@@ -163,18 +173,17 @@ def _parts(source: Source, cube: Cube, with_atoms: bool) -> tuple[list[tuple[Pla
         schema = source.formula.atoms[proposition.index]
         n_true = source.n_known(schema, True)
         if truth and source.is_closed(schema):
-            scan = Scan(f"{schema.predicate}.true", source.columns(schema))
+            scan = Scan(source.table(proposition.index, "true"), source.columns(schema))
             generators.append((scan, variables_of(schema.arguments), n_true))
         elif source.n_known(schema, not truth):
             looked_up = with_atoms and not source.is_closed(schema)
-            filters.append(
-                _looked_up(source, proposition.index, not truth) if looked_up else _excluded(source, schema, not truth)
-            )
+            filters.append((_looked_up if looked_up else _excluded)(source, proposition.index, not truth))
     return generators, filters
 
 
-def _excluded(source: Source, schema: AtomSchema, truth: bool) -> _Filter:
-    table = f"{schema.predicate}.{'true' if truth else 'false'}{source.excluded}"
+def _excluded(source: Source, index: int, truth: bool) -> _Filter:
+    schema = source.formula.atoms[index]
+    table = source.table(index, "true" if truth else "false") + source.excluded
     return _without(schema, Scan(table, source.columns(schema)))
 
 
@@ -347,7 +356,7 @@ def with_atom(plan: Plan, source: Source, index: int, dropped: int | None = None
     """
     schema = source.formula.atoms[index]
     has_facts = bool(len(source.evidence.facts[schema.predicate].truth))
-    table = f"{schema.predicate}.known"
+    table = source.table(index, "known")
     key = (0 if source.world is None else source.world, *map(side, schema.arguments))
     if source.is_closed(schema):
         return Lookup(plan, table, key, atom_column(index), KNOWN_FALSE)

@@ -1,81 +1,76 @@
 """Factors taken out of blocks and put in: blocks whose rows are in the order in which `merge` leaves them, in and out.
 
-Rows are found by bisection, so that what stays is only copied.
+Rows are found by bisection, and each array is copied once, so that what stays costs little more than its memory.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mlnlite.ground.assemble import index_in
 from mlnlite.ground.blocks import Blocks
+from mlnlite.ground.index import index_in
 from mlnlite.ground.merge import Factors
 from mlnlite.ground.network import Clauses, Counts, Tables
+from mlnlite.model.change import spliced
 
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 Block = TypeVar("Block", Clauses, Tables, Counts)
-Array = NDArray[Any]
+
+CHUNK = 1 << 16
+"""Numbers that are changed at once, so that they stay in the cache."""
+
+FEW = 4
+"""Atoms that may come or go for the others to be numbered anew by sums, which is faster than by a table."""
+
+Renumber = Callable[[Int32, Int32], Int32]
+"""Writes literals with the atoms' new indices to the second array, which may be the first, and returns it."""
 
 
-def without(blocks: Blocks, less: Blocks, dropped: Bool) -> Blocks:
-    """The blocks less the counts of other factors, all of which they have.
+def patched(blocks: Blocks, taken: Blocks, put: Blocks, dropped: Bool, atoms: tuple[Int64, Int64]) -> Blocks:
+    """The blocks less the counts of some factors, all of which they have, and with others, equal ones made one.
 
     Args:
         blocks: whose.
-        less: what to take away.
+        taken: what to take away.
+        put: what to add, with the indices that atoms have afterwards.
         dropped: shape (n_weights,), weights of which every factor goes.
+        atoms: the numbers of the atoms before and after, both rising.
     """
-    return _pairwise(blocks, less, lambda rows, other: _without(rows, other, dropped))
+    renumber = _renumbering(*atoms)
 
+    def combined(mine: Sequence[Block], less: Sequence[Block], more: Sequence[Block]) -> tuple[Block, ...]:
+        return _combined(mine, less, more, lambda a, b, c: _changed(a, b, c, dropped, renumber))
 
-def together(blocks: Blocks, more: Blocks) -> Blocks:
-    """The factors of both, equal ones made one."""
-    return _pairwise(blocks, more, _together)
-
-
-def renumbered(blocks: Blocks, before: Int64, after: Int64) -> Blocks:
-    """The blocks with the indices that their atoms have among those of `after`, not of `before`, both rising."""
-    if np.array_equal(before, after):
-        return blocks
-    atom = index_in(after)(before)  # those that are gone are in no row
-    literal = np.concatenate([np.zeros(1, np.int32), atom + np.int32(1), -atom[::-1] - np.int32(1)])
     return Blocks(
-        tuple(replace(b, literals=literal.take(b.literals, mode="wrap")) for b in blocks.clauses),
-        tuple(replace(b, atoms=atom.take(b.atoms)) for b in blocks.tables),
-        tuple(replace(b, literals=literal.take(b.literals, mode="wrap")) for b in blocks.counts),
+        combined(blocks.clauses, taken.clauses, put.clauses),
+        combined(blocks.tables, taken.tables, put.tables),
+        combined(blocks.counts, taken.counts, put.counts),
     )
 
 
-# --- blocks as rows
-
-
-def _pairwise(blocks: Blocks, others: Blocks, combine: Callable[[Factors, Factors], Factors]) -> Blocks:
-    return Blocks(
-        _combined(blocks.clauses, others.clauses, combine),
-        _combined(blocks.tables, others.tables, combine),
-        _combined(blocks.counts, others.counts, combine),
-    )
+# --- blocks as rows of literals
 
 
 def _combined(
-    blocks: Sequence[Block], others: Sequence[Block], combine: Callable[[Factors, Factors], Factors]
+    blocks: Sequence[Block],
+    less: Sequence[Block],
+    more: Sequence[Block],
+    combine: Callable[[Factors, Factors, Factors], Factors],
 ) -> tuple[Block, ...]:
     """Blocks of the same shape combined, those that come out empty left out."""
-    mine: dict[Hashable, Block] = {_shape(b): b for b in blocks}
-    theirs: dict[Hashable, Block] = {_shape(b): b for b in others}
+    mine, taken, put = ({_shape(b): b for b in side} for side in (blocks, less, more))
     found = []
-    for shape in (*mine, *(s for s in theirs if s not in mine)):
-        block = mine.get(shape) or theirs[shape]
-        first, second = (_rows(side[shape]) if shape in side else _no_rows(block) for side in (mine, theirs))
-        rows, weight, count = combine(first, second)
+    for shape, block in {**mine, **put}.items():
+        sides = (_rows(side[shape]) if shape in side else _no_rows(block) for side in (mine, taken, put))
+        rows, weight, count = combine(*sides)
         for array in (rows, weight, count):
             array.setflags(write=False)
         found.append(_with_rows(block, rows, weight, count))
@@ -91,7 +86,8 @@ def _shape(block: Clauses | Tables | Counts) -> Hashable:
 
 
 def _rows(block: Clauses | Tables | Counts) -> Factors:
-    return block.atoms if isinstance(block, Tables) else block.literals, block.weight, block.count
+    literals = block.atoms + np.int32(1) if isinstance(block, Tables) else block.literals
+    return literals, block.weight, block.count
 
 
 def _no_rows(block: Clauses | Tables | Counts) -> Factors:
@@ -101,87 +97,115 @@ def _no_rows(block: Clauses | Tables | Counts) -> Factors:
 
 def _with_rows(block: Block, rows: Int32, weight: Int32, count: Int64) -> Block:
     if isinstance(block, Tables):
-        return replace(block, atoms=rows, weight=weight, count=count)
+        return replace(block, atoms=rows - np.int32(1), weight=weight, count=count)
     return replace(block, literals=rows, weight=weight, count=count)
 
 
 # --- rows
 
 
-def _without(factors: Factors, less: Factors, dropped: Bool) -> Factors:
-    rows, weight, count = factors
-    if not len(less[1]) and not dropped.any():
-        return factors
-    place = _places(factors, less)
-    left = count.copy()
-    left[place] -= less[2]
-    if not dropped.any():
-        gone = place[left[place] == 0]
-        return _deleted(rows, gone), _deleted(weight, gone), _deleted(left, gone)
-    keep = np.flatnonzero((left > 0) & ~dropped[weight])
-    return rows[keep], weight[keep], left[keep]
+def _changed(mine: Factors, less: Factors, more: Factors, dropped: Bool, renumber: Renumber | None) -> Factors:
+    rows, weight, count = mine
+    place = _places(less, len(weight), lambda i: (rows[i], weight[i]))
+    left = count[place] - less[2]
+    gone = place[left == 0]
+    if dropped.any():
+        gone = np.union1d(gone, np.flatnonzero(dropped[weight]))
+    before = gone - np.arange(len(gone))
+
+    def staying(i: Int64) -> tuple[Int32, Int32]:
+        i = i + np.searchsorted(before, i, side="right")
+        found = rows[i]
+        return found if renumber is None else renumber(found, found), weight[i]
+
+    n_left = len(weight) - len(gone)
+    at = _places(more, n_left, staying)
+    there = at < n_left
+    found_rows, found_weight = staying(at[there])
+    there[there] = (found_weight == more[1][there]) & (found_rows == more[0][there]).all(axis=1)
+    new, at_new = ~there, at[~there]
+    count = _recounted(
+        spliced(count, gone, at_new, more[2][new]) if len(gone) + len(at_new) else count.copy(),
+        np.concatenate([(place - np.searchsorted(gone, place))[left > 0], at[there]]),
+        np.concatenate([-less[2][left > 0], more[2][there]]),
+        at_new,
+    )
+    changed = spliced(rows, gone, at_new, more[0][new])
+    if renumber is not None:
+        changed = renumber(changed, changed if changed is not rows else np.empty_like(rows))
+        changed[at_new + np.arange(len(at_new))] = more[0][new]  # these had their new indices
+    return changed, spliced(weight, gone, at_new, more[1][new]), count
 
 
-def _together(factors: Factors, more: Factors) -> Factors:
-    rows, weight, count = factors
-    if not len(more[1]):
-        return factors
-    place = _places(factors, more)
-    there = np.zeros(len(place), np.bool_)
-    if len(weight):
-        inside = np.minimum(place, len(weight) - 1)
-        there = (weight[inside] == more[1]) & (rows[inside] == more[0]).all(axis=1)
-    count = count.copy()
-    count[place[there]] += more[2][there]
-    new, at = ~there, place[~there]
-    return _inserted(rows, at, more[0][new]), _inserted(weight, at, more[1][new]), _inserted(count, at, more[2][new])
+def _recounted(count: Int64, staying: Int64, by: Int64, at_new: Int64) -> Int64:
+    """Counts with some changed: of rows that stayed, each of which new rows have come before."""
+    np.add.at(count, staying + np.searchsorted(at_new, staying, side="right"), by)
+    return count
 
 
-FEW = 1000
-"""Rows up to which an array is cut into pieces: these are copied whole, which is faster than by an index or a mask."""
-
-
-def _deleted(array: Array, at: Int64) -> Array:
-    """An array without some rows, whose indices rise."""
-    if len(at) > FEW:
-        return np.delete(array, at, axis=0)
-    if not len(at):
-        return array
-    first, *others = np.split(array, at)
-    return np.concatenate([first, *(part[1:] for part in others)])
-
-
-def _inserted(array: Array, at: Int64, rows: Array) -> Array:
-    """An array with rows put in before those at some indices, which rise."""
-    if len(at) > FEW:
-        return np.insert(array, at, rows, axis=0)
-    if not len(at):
-        return array
-    first, *others = np.split(array, at)
-    return np.concatenate([first, *(part for i, old in enumerate(others) for part in (rows[i : i + 1], old))])
-
-
-def _places(factors: Factors, wanted: Factors) -> Int64:
-    """Where rows stand, or would stand: the number of rows before each."""
-    low = np.zeros(len(wanted[1]), np.int64)
-    high = np.full(len(wanted[1]), len(factors[1]), np.int64)
-    for _ in range(len(factors[1]).bit_length()):
-        middle, searched = (low + high) // 2, low < high
-        less = _less(factors, np.minimum(middle, len(factors[1]) - 1), wanted)
+def _places(wanted: Factors, n: int, row_at: Callable[[Int64], tuple[Int32, Int32]]) -> Int64:
+    """Where rows stand, or would stand, among `n` rows in rising order, which `row_at` gives by their indices."""
+    low, high = np.zeros(len(wanted[1]), np.int64), np.full(len(wanted[1]), n, np.int64)
+    for _ in range(n.bit_length()):
+        middle, searched = np.minimum((low + high) // 2, n - 1), low < high
+        less = _less(*row_at(middle), wanted)
         low, high = np.where(searched & less, middle + 1, low), np.where(searched & ~less, middle, high)
     return low
 
 
-def _less(factors: Factors, index: Int64, wanted: Factors) -> Bool:
-    """Whether the rows at some indices stand before those that are wanted."""
-    rows, weight, _ = factors
-    less = np.zeros(len(index), np.bool_)
-    for mine, other in zip(reversed(rows[index].T), reversed(wanted[0].T), strict=True):
-        mine, other = _rank(mine), _rank(other)
+def _less(rows: Int32, weight: Int32, wanted: Factors) -> Bool:
+    """Whether rows stand before others in the order of `merge`."""
+    less = np.zeros(len(weight), np.bool_)
+    for mine, other in zip(reversed(_ranks(rows).T), reversed(_ranks(wanted[0]).T), strict=True):
         less = (mine < other) | (mine == other) & less
-    return np.asarray((weight[index] < wanted[1]) | (weight[index] == wanted[1]) & less)
+    return np.asarray((weight < wanted[1]) | (weight == wanted[1]) & less)
 
 
-def _rank(number: NDArray[np.int32]) -> Int64:
+def _ranks(literals: Int32) -> Int64:
     """By what rows are in order: the atom of a literal, then whether it is negative."""
-    return np.abs(number, dtype=np.int64) * 2 + (number < 0)
+    return np.abs(literals, dtype=np.int64) * 2 + (literals < 0)
+
+
+# --- indices of atoms
+
+
+def _renumbering(before: Int64, after: Int64) -> Renumber | None:
+    """What gives literals their new indices; None if these are the old ones. Atoms that are gone are in no literal."""
+    steps = _steps(before, after)
+    if steps is None:
+        atom = index_in(after, len(before))(before)
+        literal = np.concatenate([np.zeros(1, np.int32), atom + np.int32(1), -atom[::-1] - np.int32(1)])
+        return lambda literals, out: literal.take(literals, out=out, mode="wrap")
+    return (lambda literals, out: _moved(literals, steps, out)) if steps else None
+
+
+def _steps(before: Int64, after: Int64) -> list[tuple[int, int]] | None:
+    """By how much the numbers of literals above some numbers change; None if there are many of these."""
+    steps: list[tuple[int, int]] = []
+    i = j = 0
+    while True:
+        n = min(len(before) - i, len(after) - j)
+        differ = before[i : i + n] != after[j : j + n]
+        same = int(differ.argmax()) if differ.any() else n
+        i, j = i + same, j + same
+        if i == len(before) and j == len(after):
+            return steps
+        if len(steps) == FEW:
+            return None
+        if j == len(after) or (i < len(before) and before[i] < after[j]):
+            i += 1  # the literals of the atom that goes have the number i + 1
+            steps.append((i, -1))
+        else:
+            steps.append((i, 1))
+            j += 1
+
+
+def _moved(literals: Int32, steps: list[tuple[int, int]], out: Int32) -> Int32:
+    flat, moved = literals.reshape(-1), out.reshape(-1)
+    for start in range(0, len(flat), CHUNK):
+        part = flat[start : start + CHUNK]
+        by = np.zeros(len(part), np.int8)
+        for number, step in steps:
+            by += np.int8(step) * ((part > number).view(np.int8) - (part < -number).view(np.int8))
+        np.add(part, by, out=moved[start : start + CHUNK])
+    return out

@@ -27,15 +27,23 @@ def tables_of(evidence: Evidence) -> Tables:
     """The stored tables of all predicates and types."""
     tables: dict[str, tuple[Column, ...]] = {"worlds": (np.arange(evidence.n_databases, dtype=np.int32),)}
     for name, facts in evidence.facts.items():
-        columns = (facts.database, *facts.arguments.T)
-        every = bool(facts.truth.all())
-        tables[f"{name}.true"] = columns if every else tuple(c[facts.truth] for c in columns)
-        tables[f"{name}.false"] = tuple(c[:0] if every else c[~facts.truth] for c in columns)
-        tables[f"{name}.known"] = (*columns, np.where(facts.truth, np.int8(KNOWN_TRUE), np.int8(KNOWN_FALSE)))
+        tables |= fact_tables(name, facts)
     for name, present in evidence.present.items():
         database, constant = np.nonzero(present)
         tables[f"type:{name}"] = (database.astype(np.int32), constant.astype(np.int32))
     return tables
+
+
+def fact_tables(name: str, facts: Facts, state: str = "") -> dict[str, tuple[Column, ...]]:
+    """The tables of what is known of one predicate, whose names begin with `name` and end with `state`."""
+    columns = (facts.database, *facts.arguments.T)
+    every = bool(facts.truth.all())
+    known = np.int8(KNOWN_FALSE) + facts.truth.view(np.int8) * np.int8(KNOWN_TRUE - KNOWN_FALSE)
+    return {
+        f"{name}.true{state}": columns if every else tuple(c[facts.truth] for c in columns),
+        f"{name}.false{state}": tuple(c[:0] if every else c[~facts.truth] for c in columns),
+        f"{name}.known{state}": (*columns, known),
+    }
 
 
 def completed(evidence: Evidence) -> Evidence:

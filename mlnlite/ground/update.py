@@ -15,15 +15,7 @@ from numpy.typing import NDArray
 
 from mlnlite.engines.choose import engine_for
 from mlnlite.engines.plan import Engine, Run, Tables
-from mlnlite.ground.assemble import (
-    atom_range,
-    distinct,
-    index_in,
-    known_atoms,
-    unknown,
-    variables_of,
-    with_blocks,
-)
+from mlnlite.ground.assemble import atom_range, distinct, known_atoms, unknown, variables_of
 from mlnlite.ground.blocks import Blocks, Piece, blocks_of
 from mlnlite.ground.compile import TOUCHED, Source
 from mlnlite.ground.ground import (
@@ -40,13 +32,16 @@ from mlnlite.ground.ground import (
 )
 from mlnlite.ground.network import Network
 from mlnlite.ground.numbers import atoms_numbered, numbers_of
-from mlnlite.ground.patch import renumbered, together, without
-from mlnlite.ground.tables import completed, tables_of
-from mlnlite.model.change import find
+from mlnlite.ground.patch import patched
+from mlnlite.ground.tables import completed, fact_tables, tables_of
+from mlnlite.model.change import facts_about, find, spliced
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.templates import Template
 
 Int64 = NDArray[np.int64]
+
+BEFORE = ".before"
+"""Ends the names of the tables of facts that were."""
 
 
 def updated(
@@ -71,21 +66,23 @@ def updated(
     difference = _difference(network, now, touched, engine)
     asked = np.empty(0, np.int64) if query is None else unknown(np.intersect1d(query, mine), now)
     new = distinct([numbers_of(asked, now), *(a for piece, _ in difference.put for a in piece.atoms)])
-    new = atoms_numbered(new, now)
-    atoms, block = with_blocks(_with_atoms(network.atoms, new, np.setdiff1d(mine, unknown(mine, now))), now)
-    variable, value, cardinality, is_block = variables_of(atoms, block, now)
-    taken = blocks_of(difference.taken, index_in(numbers_of(network.atoms, now)), network.n_atoms)
-    put = blocks_of(difference.put, index_in(numbers_of(atoms, now)), len(atoms))
-    left = without(Blocks(network.clauses, network.tables, network.counts), taken, difference.dropped)
-    blocks = together(renumbered(left, network.atoms, atoms), put)
+    known = np.setdiff1d(mine, unknown(mine, now))
+    variables = variables_of(_with_atoms(network.atoms, atoms_numbered(new, now), known), now)
+    blocks = patched(
+        Blocks(network.clauses, network.tables, network.counts),
+        blocks_of(difference.taken, network.atoms, now),
+        blocks_of(difference.put, variables.atoms, now),
+        difference.dropped,
+        (network.atoms, variables.atoms),
+    )
     return replace(
         network,
         evidence=now,
-        atoms=atoms,
-        variable=variable,
-        value=value,
-        cardinality=cardinality,
-        block=is_block,
+        atoms=variables.atoms,
+        variable=variables.variable,
+        value=variables.value,
+        cardinality=variables.cardinality,
+        block=variables.block,
         clauses=blocks.clauses,
         tables=blocks.tables,
         counts=blocks.counts,
@@ -110,9 +107,9 @@ def _touched(before: Evidence, now: Evidence, changed: Int64) -> dict[str, Int64
 def _with_atoms(atoms: Int64, new: Int64, known: Int64) -> Int64:
     """Rising numbers of atoms with some more, and without those that are known."""
     place, there = find(atoms, known)
-    atoms = np.delete(atoms, place[there])
+    atoms = spliced(atoms, place[there], np.empty(0, np.int64), known[:0])
     place, there = find(atoms, new)
-    return np.insert(atoms, place[~there], new[~there])
+    return spliced(atoms, np.empty(0, np.int64), place[~there], new[~there])
 
 
 # --- what the touched groundings were, and what they are
@@ -136,73 +133,75 @@ class _Difference:
 
 
 @dataclass(frozen=True, slots=True)
-class _Side:
-    """One of the two states of evidence, and what runs plans over it."""
+class _Sides:
+    """What is known before and after, the tables of both, and what runs plans over them."""
 
-    evidence: Evidence
+    before: Evidence
+    now: Evidence
+    touched: Mapping[str, Int64]
     tables: Tables
     run: Run
 
 
 def _difference(network: Network, now: Evidence, touched: Mapping[str, Int64], engine: Engine | None) -> _Difference:
     found = _Difference(network.decided_true.copy(), np.zeros(len(network.weights), np.bool_))
-    sides: tuple[_Side, _Side] | None = None
+    sides: _Sides | None = None
     for i, template in enumerate(network.model.templates):
         if not any(a.predicate in touched for a in template.formula.atoms):
             continue
-        sides = sides or (_side(network, network.evidence, touched, engine), _side(network, now, touched, engine))
+        sides = sides or _sides(network, now, touched, engine)
         rows = slice(*np.searchsorted(network.template, [i, i + 1]).tolist())
         with blamed(template):
             if counting_source(i, template, now) is None:
-                _add_touched(found, source_of(i, template, now), template, rows, sides, touched)
+                _add_touched(found, source_of(i, template, now), template, rows, sides)
             else:
-                _add_whole(found, i, template, rows, sides[1])
+                _add_whole(found, i, template, rows, sides)
     return found
 
 
-def _side(network: Network, evidence: Evidence, touched: Mapping[str, Int64], engine: Engine | None) -> _Side:
-    tables = {**tables_of(evidence), **row_tables(network.model)}
+def _sides(network: Network, now: Evidence, touched: Mapping[str, Int64], engine: Engine | None) -> _Sides:
+    tables = {**tables_of(now), **row_tables(network.model)}
+    for name, facts in network.evidence.facts.items():
+        if name in touched:
+            tables |= fact_tables(name, facts, BEFORE)
+        else:
+            tables |= {f"{name}.{kind}{BEFORE}": tables[f"{name}.{kind}"] for kind in ("true", "false", "known")}
     for name, numbers in touched.items():
-        tables[f"{name}{TOUCHED}"] = (np.zeros(len(numbers), np.int32), *evidence.arguments_of(name, numbers).T)
-    return _Side(evidence, tables, (engine or engine_for()).load(tables))
+        tables[f"{name}{TOUCHED}"] = (np.zeros(len(numbers), np.int32), *now.arguments_of(name, numbers).T)
+        for evidence, state in ((network.evidence, BEFORE), (now, "")):
+            tables |= fact_tables(f"{name}{TOUCHED}", facts_about(evidence, name, numbers), state)
+    return _Sides(network.evidence, now, touched, tables, (engine or engine_for()).load(tables))
 
 
-def _add_whole(found: _Difference, index: int, template: Template, rows: slice, now: _Side) -> None:
-    part = ground_template(index, template, now.evidence, now.run, now.tables)
+def _add_whole(found: _Difference, index: int, template: Template, rows: slice, sides: _Sides) -> None:
+    part = ground_template(index, template, sides.now, sides.run, sides.tables)
     found.dropped[rows] = True
     found.decided_true[rows] = part.decided_true
     found.put.extend((piece, rows.start) for piece in part.pieces)
 
 
-def _add_touched(
-    found: _Difference,
-    source: Source,
-    template: Template,
-    rows: slice,
-    sides: tuple[_Side, _Side],
-    touched: Mapping[str, Int64],
-) -> None:
+def _add_touched(found: _Difference, source: Source, template: Template, rows: slice, sides: _Sides) -> None:
     """Adds what the groundings of a template were and are that touch one of the atoms."""
-    indices = [i for i, atom in enumerate(source.formula.atoms) if atom.predicate in touched]
+    indices = [i for i, atom in enumerate(source.formula.atoms) if atom.predicate in sides.touched]
+    before = replace(source, evidence=sides.before, state=BEFORE)
     more_true, more_open = (np.zeros(source.n_rows, np.int64) for _ in range(2))
     for end in range(1, len(indices) + 1):
-        mine = replace(source, touching=tuple(indices[:end]))
-        for side, sign, pieces in zip(sides, (-1, 1), (found.taken, found.put), strict=True):
-            tally, lists_true = _listed(replace(mine, evidence=side.evidence), side)
+        for side, sign, pieces in ((before, -1, found.taken), (source, 1, found.put)):
+            tally, lists_true = _listed(replace(side, touching=tuple(indices[:end])), sides.run)
             pieces.extend((piece, rows.start) for piece in tally.pieces)
             more_true += sign * (tally.true if lists_true else -tally.false - tally.open)
             more_open += sign * tally.open
     if template.hard and (more_true + more_open < 0).any():
         plan = plan_of(source)
-        raise violated(template, "" if isinstance(plan, bool) else violation(source, plan, sides[1].run))
+        raise violated(template, "" if isinstance(plan, bool) else violation(source, plan, sides.run))
     found.decided_true[rows] += more_true
 
 
-def _listed(source: Source, side: _Side) -> tuple[Tally, bool]:
+def _listed(source: Source, run: Run) -> tuple[Tally, bool]:
     """What the plan of a source lists, and whether it is where the formula can be true."""
     plan = plan_of(source)
     if isinstance(plan, bool):
         return Tally([], *(np.zeros(source.n_rows, np.int64) for _ in range(3))), plan
-    tally = tally_of(source, plan, side.run, [plan.compiled.plan])
+    tally = tally_of(source, plan, run, [plan.compiled.plan])
     assert tally is not None  # nothing is counted
     return tally, plan.lists_true

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 from math import comb
 from typing import TypeAlias, assert_never
@@ -302,6 +303,7 @@ def first_proposition(expression: Expression) -> Proposition:
             assert_never(expression)
 
 
+@lru_cache(maxsize=128)
 def cubes(expression: Expression, value: bool) -> tuple[Cube, ...]:
     """Disjoint cubes that cover exactly where the expression has a value.
 
