@@ -106,6 +106,8 @@ def _with_rows(block: Block, rows: Int32, weight: Int32, count: Int64) -> Block:
 
 def _changed(mine: Factors, less: Factors, more: Factors, dropped: Bool, renumber: Renumber | None) -> Factors:
     rows, weight, count = mine
+    if not len(less[1]) and not len(more[1]) and not dropped.any():
+        return rows if renumber is None else renumber(rows, np.empty_like(rows)), weight, count
     place = _places(less, len(weight), lambda i: (rows[i], weight[i]))
     left = count[place] - less[2]
     gone = place[left == 0]
@@ -146,7 +148,7 @@ def _recounted(count: Int64, staying: Int64, by: Int64, at_new: Int64) -> Int64:
 def _places(wanted: Factors, n: int, row_at: Callable[[Int64], tuple[Int32, Int32]]) -> Int64:
     """Where rows stand, or would stand, among `n` rows in rising order, which `row_at` gives by their indices."""
     low, high = np.zeros(len(wanted[1]), np.int64), np.full(len(wanted[1]), n, np.int64)
-    for _ in range(n.bit_length()):
+    for _ in range(n.bit_length() if len(low) else 0):
         middle, searched = np.minimum((low + high) // 2, n - 1), low < high
         less = _less(*row_at(middle), wanted)
         low, high = np.where(searched & less, middle + 1, low), np.where(searched & ~less, middle, high)

@@ -64,7 +64,7 @@ def updated(
     touched = _touched(network.evidence, now, changed)
     mine = distinct(list(touched.values()))
     difference = _difference(network, now, touched, engine)
-    asked = np.empty(0, np.int64) if query is None else unknown(np.intersect1d(query, mine), now)
+    asked = np.empty(0, np.int64) if query is None else unknown(query[find(mine, query)[1]], now)
     new = distinct([numbers_of(asked, now), *(a for piece, _ in difference.put for a in piece.atoms)])
     known = np.setdiff1d(mine, unknown(mine, now))
     variables = variables_of(_with_atoms(network.atoms, atoms_numbered(new, now), known), now)
