@@ -26,6 +26,7 @@ from mlnlite.errors import did_you_mean as did_you_mean
 from mlnlite.plugins import Plugin as Plugin
 
 if TYPE_CHECKING:
+    from mlnlite.ground.forecast import Limits as Limits
     from mlnlite.ground.ground import ground as ground
     from mlnlite.ground.network import Network as Network
     from mlnlite.infer.alternatives import map_states as map_states
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Limits": "mlnlite.ground.forecast",
     "ground": "mlnlite.ground.ground",
     "Network": "mlnlite.ground.network",
     "map_state": "mlnlite.infer.answer",

@@ -1,12 +1,17 @@
 """The commands. Here, and nowhere else, something is printed and the process ends with an exit code.
 
-Exit codes: 0 an answer, 1 no answer within the limits, 2 a mistake of the user, 130 interrupted.
+Exit codes: 0 an answer, 1 no answer within the limits, 2 a mistake of the user, 130 interrupted, 143 terminated.
 """
 
 from __future__ import annotations
 
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import EntryPoint
+from types import FrameType
 
 import click
 
@@ -29,7 +34,7 @@ COMMANDS = {
 }
 """The built-in commands with a line each; `mlnlite.cli.NAME` is imported when NAME is asked for."""
 
-NO_ANSWER, USER_ERROR, INTERRUPTED = 1, 2, 130
+NO_ANSWER, USER_ERROR, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 
 
 class Commands(click.Group):
@@ -56,14 +61,34 @@ class Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> object:
         """Runs a command; a user's mistake becomes a message and an exit code."""
-        try:
-            return super().invoke(ctx)
-        except MlnError as error:
-            click.echo(_message(error, ctx.meta.get("mlnlite.format")), err=True)
-            ctx.exit(NO_ANSWER if isinstance(error, LimitReached) else USER_ERROR)
-        except KeyboardInterrupt:
-            click.echo("interrupted", err=True)
-            ctx.exit(INTERRUPTED)
+        with _terminable() as terminated:
+            try:
+                return super().invoke(ctx)
+            except MlnError as error:
+                click.echo(_message(error, ctx.meta.get("mlnlite.format")), err=True)
+                ctx.exit(NO_ANSWER if isinstance(error, LimitReached) else USER_ERROR)
+            except KeyboardInterrupt:
+                click.echo("terminated" if terminated else "interrupted", err=True)
+                ctx.exit(TERMINATED if terminated else INTERRUPTED)
+
+
+@contextmanager
+def _terminable() -> Iterator[list[int]]:
+    """Makes SIGTERM end a command as Ctrl-C does, so that all is tidied up; the list then has the signal."""
+    received: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield received
+        return
+
+    def end(number: int, _: FrameType | None) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _message(error: MlnError, format_name: object) -> str:
@@ -102,7 +127,7 @@ def _summary(entry: EntryPoint) -> str:
 def mlnlite() -> None:
     """Markov logic networks: exact where affordable, fast, and clear.
 
-    Exit codes: 0 an answer, 1 no answer within the limits, 2 a mistake in the input, 130 interrupted.
+    Exit codes: 0 an answer, 1 no answer within the limits, 2 a mistake in the input, 130 interrupted, 143 terminated.
     """
 
 

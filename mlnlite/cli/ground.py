@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
@@ -18,6 +17,7 @@ from mlnlite.cli.options import (
     dialect_option,
     evidence_option,
     format_option,
+    limit_options,
     models_argument,
     names,
     open_world_option,
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from mlnlite.ground.forecast import Forecast
     from mlnlite.ground.network import Network
     from mlnlite.syntax.tree import Dialect
-
-UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9}
 
 
 class _Options(TypedDict):
@@ -50,15 +48,6 @@ class _Options(TypedDict):
     format: Literal["text", "json"]
 
 
-def _memory(_: click.Context, __: click.Parameter, value: str | None) -> int | None:
-    if value is None:
-        return None
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMG]?)B?", value.strip().upper())
-    if match is None:
-        raise click.BadParameter("expected a number of bytes such as 500MB or 2GB")
-    return int(float(match[1]) * UNITS[match[2]])
-
-
 def _all_writable(_: click.Context, __: click.Parameter, value: tuple[Path, ...]) -> tuple[Path, ...]:
     for path in value:
         verify_writable(path)
@@ -72,8 +61,7 @@ def _all_writable(_: click.Context, __: click.Parameter, value: tuple[Path, ...]
 @open_world_option
 @database_option
 @click.option("--forecast", is_flag=True, help="Only say what each formula would take.")
-@click.option("--max-groundings", type=click.IntRange(min=0), metavar="N", help="Open groundings of one formula.")
-@click.option("--max-memory", callback=_memory, metavar="SIZE", help="Memory for one formula, such as 500MB or 2GB.")
+@limit_options
 @click.option(
     "--export",
     type=FILE,

@@ -81,6 +81,29 @@ def time_limit_option(text: str) -> Callable[[Command], Command]:
     return click.option("--time-limit", type=limit, metavar="SECONDS", help=text)
 
 
+UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9}
+
+
+def _memory(_: click.Context, __: click.Parameter, value: str | None) -> int | None:
+    if value is None:
+        return None
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMG]?)B?", value.strip().upper())
+    if match is None:
+        raise click.BadParameter("expected a number of bytes such as 500MB or 2GB")
+    return int(float(match[1]) * UNITS[match[2]])
+
+
+def limit_options(command: Command) -> Command:
+    """`--max-groundings` and `--max-memory`."""
+    memory = click.option(
+        "--max-memory", callback=_memory, metavar="SIZE", help="Memory for one formula, such as 500MB or 2GB."
+    )
+    groundings = click.option(
+        "--max-groundings", type=click.IntRange(min=0), metavar="N", help="Open groundings of one formula."
+    )
+    return groundings(memory(command))
+
+
 database_option = click.option(
     "--database", type=click.IntRange(min=1), metavar="N", help="Which of the databases of the file, the first being 1."
 )

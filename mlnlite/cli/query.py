@@ -18,6 +18,7 @@ from mlnlite.cli.options import (
     dialect_option,
     evidence_option,
     format_option,
+    limit_options,
     models_argument,
     names,
     open_world_option,
@@ -29,6 +30,7 @@ from mlnlite.cli.worlds import closed_world, evidence_of_one_world, opened
 from mlnlite.errors import QueryMistake
 
 if TYPE_CHECKING:
+    from mlnlite.ground.forecast import Limits
     from mlnlite.infer.approach import MarginalMethod
     from mlnlite.infer.map.rungs import Method as MapMethod
     from mlnlite.model.evidence import Evidence
@@ -78,6 +80,8 @@ class _Options(TypedDict):
     why: bool
     explain: str | None
     width_limit: int | None
+    max_groundings: int | None
+    max_memory: int | None
     dialect: Dialect | None
     format: Literal["text", "json", "csv"]
 
@@ -144,6 +148,7 @@ class _Options(TypedDict):
     metavar="ENTRIES",
     help="Largest number of entries of a table in exact marginals, 2^25 by default, 8 bytes each.",
 )
+@limit_options
 @dialect_option
 @format_option("text", "json", "csv")
 def query(**options: Unpack[_Options]) -> None:
@@ -151,6 +156,8 @@ def query(**options: Unpack[_Options]) -> None:
 
     An atom that is not a fact is unknown, unless its predicate's world is closed: by `*` in the model, or here.
     Several evidence files describe one world together; of a file with several databases choose one by --database.
+    With --max-groundings or --max-memory a formula that would take more is named, with what would help; the exit code
+    is then 1.
     """
     import mlnlite as ml
     from mlnlite.syntax.queries import split_queries
@@ -189,6 +196,7 @@ def _answer(model: Model, evidence: Evidence, items: list[str], options: _Option
             margins=options["margins"],
             why=options["why"],
             explain=options["explain"],
+            limits=_limits(options),
         )
     ask = ml.joint if options["joint"] else ml.marginal
     return ask(
@@ -202,6 +210,7 @@ def _answer(model: Model, evidence: Evidence, items: list[str], options: _Option
         time_limit=options["time_limit"],
         chains=options["chains"],
         seed=options["seed"],
+        limits=_limits(options),
     )
 
 
@@ -217,7 +226,14 @@ def _states(model: Model, evidence: Evidence, items: list[str], options: _Option
         closed_world=closed_world(model, items, names(options["closed_world"]), names(options["open_world"])),
         time_limit=options["time_limit"],
         seed=options["seed"],
+        limits=_limits(options),
     )
+
+
+def _limits(options: _Options) -> Limits:
+    import mlnlite as ml
+
+    return ml.Limits(options["max_groundings"], options["max_memory"])
 
 
 def _several(states: tuple[MapState, ...], format_name: str, *, whole: bool) -> str:

@@ -8,6 +8,8 @@ import numpy as np
 
 from mlnlite.engines.plan import Engine
 from mlnlite.errors import QueryMistake
+from mlnlite.ground.forecast import Limits
+from mlnlite.ground.ground import NO_LIMITS
 from mlnlite.ground.network import Network
 from mlnlite.infer.answer import ask, state_of
 from mlnlite.infer.map.kbest import World, best_worlds, diverse_worlds
@@ -31,6 +33,7 @@ def map_states(  # noqa: PLR0913
     time_limit: float | None = None,
     seed: int = 0,
     engine: Engine | None = None,
+    limits: Limits = NO_LIMITS,
 ) -> tuple[MapState, ...]:
     """The k most probable worlds given evidence, or k good ones that differ.
 
@@ -44,6 +47,7 @@ def map_states(  # noqa: PLR0913
         time_limit: [s] for all of them.
         seed: of the search.
         engine: what runs the grounding plans.
+        limits: what grounding may take.
 
     Returns:
         Answers, best first. "optimal" means: no world that is not listed before has a larger log-weight; of different
@@ -58,7 +62,7 @@ def map_states(  # noqa: PLR0913
     if diverse is not None and not 0 <= diverse < np.inf:
         raise QueryMistake(f"{diverse} is no log-weight to lose", "give a finite number of 0 or more")
     verify(time_limit=time_limit, seed=seed)
-    asked = ask(model, evidence, query, closed_world, engine)
+    asked = ask(model, evidence, query, closed_world, engine, limits)
     network, limit = asked.network, time_limit
     if diverse is None:
         worlds = best_worlds(network, k, time_limit=limit, seed=seed)

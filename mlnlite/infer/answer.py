@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from mlnlite.engines.plan import Engine
 from mlnlite.errors import QueryMistake
-from mlnlite.ground.ground import ground
+from mlnlite.ground.forecast import Limits
+from mlnlite.ground.ground import NO_LIMITS, ground
 from mlnlite.ground.groups import renamed
 from mlnlite.ground.network import Network
 from mlnlite.infer.approach import Approach, MarginalMethod
@@ -52,6 +53,7 @@ def marginal(  # noqa: PLR0913
     chains: int = 4,
     seed: int = 0,
     engine: Engine | None = None,
+    limits: Limits = NO_LIMITS,
 ) -> Marginals:
     """Probabilities of atoms and formulas given evidence: exact wherever that is cheap, else with error bars.
 
@@ -71,11 +73,13 @@ def marginal(  # noqa: PLR0913
         chains: how many are sampled, at least 2.
         seed: where the chance of sampling starts.
         engine: what runs the grounding plans; by default chosen by size.
+        limits: what grounding may take; by default the machine's memory.
 
     Raises:
         QueryMistake: if the query, or a closed world, does not fit the model.
         Contradiction: if no world satisfies the evidence and the hard formulas.
-        LimitReached: if an exact answer was asked for and would need more than the limit.
+        LimitReached: if a formula needs more than the limits of grounding, or an exact answer was asked for and would
+            need more than the limit.
     """
     approach = Approach(method, width_limit, precision, time_limit, chains, seed)
     if method in ("auto", "lifted") and query is not None:
@@ -83,7 +87,7 @@ def marginal(  # noqa: PLR0913
         lifted = lifted_marginals(model, known, query, others_closed=closed_world == "all", must=method == "lifted")
         if lifted is not None:
             return lifted
-    asked = ask(model, evidence, query, closed_world, engine)
+    asked = ask(model, evidence, query, closed_world, engine, limits)
     return marginals_for(asked.network, asked.question, approach, asked.seconds)
 
 
@@ -127,6 +131,7 @@ def map_state(  # noqa: PLR0913
     why: bool = False,
     explain: str | None = None,
     engine: Engine | None = None,
+    limits: Limits = NO_LIMITS,
 ) -> MapState:
     """A most probable world given evidence, with a bound that proves it or says how much better another could be.
 
@@ -144,6 +149,7 @@ def map_state(  # noqa: PLR0913
         why: also list the groundings that the world pays for.
         explain: an atom of which to show the best world in which it is the other way round.
         engine: what runs the grounding plans; by default chosen by size.
+        limits: what grounding may take; by default the machine's memory.
 
     Raises:
         QueryMistake: if the query, or a closed world, does not fit the model, or an option means nothing.
@@ -153,7 +159,7 @@ def map_state(  # noqa: PLR0913
     from mlnlite.infer.map.rungs import verify
 
     verify(method=method, time_limit=time_limit, seed=seed, gap=gap)
-    asked = ask(model, evidence, query, closed_world, engine, waits=True)
+    asked = ask(model, evidence, query, closed_world, engine, limits, waits=True)
     return map_state_for(
         asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, gap=gap, margins=margins,
         why=why, explain=explain, lazy=asked.lazy, ground_seconds=asked.seconds,
@@ -259,6 +265,7 @@ def ask(
     query: str | Sequence[str] | None,
     closed_world: str | Iterable[str],
     engine: Engine | None,
+    limits: Limits = NO_LIMITS,
     *,
     waits: bool = False,
 ) -> Asked:
@@ -271,8 +278,8 @@ def ask(
         from mlnlite.infer.map.cuts.waiting import without_lazy, worth_waiting
 
         waiting = worth_waiting(model, evidence)
-        lazy = without_lazy(model, evidence, waiting, atoms, engine) if waiting else None
-    network = ground(model, evidence, query=atoms, engine=engine) if lazy is None else lazy.network
+        lazy = without_lazy(model, evidence, waiting, atoms, engine, limits) if waiting else None
+    network = lazy.network if lazy else ground(model, evidence, query=atoms, engine=engine, limits=limits)
     question = question or Question(network.atoms, (), frozenset())
     return Asked(question, network, perf_counter() - start, lazy)
 

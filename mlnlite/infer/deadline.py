@@ -48,18 +48,28 @@ def in_seconds(time_limit: float | None) -> Deadline:
 
 @contextmanager
 def interruptible(deadline: Deadline) -> Iterator[None]:
-    """Makes the first Ctrl-C end the search instead of the program; the second one ends the program."""
+    """Makes the first Ctrl-C end the search instead of the program; the second one ends the program.
+
+    SIGTERM, where the program has told what it is to do then, also ends the search first.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.getsignal(signal.SIGINT)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    terminated = []
 
-    def stop(_: int, __: FrameType | None) -> None:
+    def stop(number: int, _: FrameType | None) -> None:
         deadline.stop.set()
-        signal.signal(signal.SIGINT, before)
+        signal.signal(number, before[signal.Signals(number)])
+        terminated.extend([number] if number == signal.SIGTERM else [])
 
     signal.signal(signal.SIGINT, stop)
+    if callable(before[signal.SIGTERM]):
+        signal.signal(signal.SIGTERM, stop)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, action in before.items():
+            signal.signal(number, action)
+        if terminated:
+            signal.raise_signal(signal.SIGTERM)

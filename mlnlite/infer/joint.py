@@ -8,6 +8,7 @@ from typing import TypedDict, Unpack
 
 from mlnlite.engines.plan import Engine
 from mlnlite.errors import QueryMistake
+from mlnlite.ground.forecast import Limits
 from mlnlite.infer.answer import marginal
 from mlnlite.infer.approach import MarginalMethod
 from mlnlite.infer.query import question_of
@@ -30,6 +31,7 @@ class Options(TypedDict, total=False):
     chains: int
     seed: int
     engine: Engine | None
+    limits: Limits
 
 
 def joint(model: Model, evidence: Evidence, query: str | Sequence[str], **options: Unpack[Options]) -> Marginals:

@@ -67,16 +67,17 @@ def command(folder, *arguments):
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
-        (["all.mln", "--max-memory", "100MB"], "all.mln:5:1: error [E410]: formula 2 needs about"),
-        (
-            ["hub.mln", "-e", "hub.db", "--max-memory", "60MB"],
-            "hub.mln:3:1: error [E402]: formula 1 cannot be grounded",
-        ),
-        (["hub.mln", "-e", "hub.db", "--max-groundings", "99999"], "hub.mln:3:1: error [E402]: formula 1 cannot be"),
+        ("ground all.mln --max-memory 100MB", "all.mln:5:1: error [E410]: formula 2 needs about"),
+        ("query all.mln -q T --max-memory 100MB", "all.mln:5:1: error [E410]: formula 2 needs about"),
+        ("ground hub.mln -e hub.db --max-memory 60MB", "hub.mln:3:1: error [E402]: formula 1 cannot be grounded"),
+        ("ground hub.mln -e hub.db --max-groundings 99999", "hub.mln:3:1: error [E402]: formula 1 cannot be grounded"),
+        ("query hub.mln -e hub.db -q G(A1,H,A2) --max-memory 60MB", "hub.mln:3:1: error [E402]: formula 1 cannot be"),
+        ("query hub.mln -e hub.db --task map --max-groundings 99999", "hub.mln:3:1: error [E402]: formula 1 cannot"),
+        ("query hub.mln -e hub.db --task map --k 2 --max-memory 60MB", "hub.mln:3:1: error [E402]: formula 1 cannot"),
     ],
 )
 def test_low_limits_end_in_a_message_that_names_the_culprit(hub, arguments, culprit):
-    with command(hub, "ground", *arguments) as process:
+    with command(hub, *arguments.split()) as process:
         stdout, stderr = process.communicate(timeout=60)
         assert (process.returncode, stdout) == (1, "")
         assert stderr.startswith(culprit)
@@ -100,12 +101,20 @@ def test_memory_stays_near_the_limit(hub):
     assert used < 400 * 10**6  # the join has a gigabyte
 
 
-def test_an_interrupted_join_leaves_no_files(hub):
-    with command(hub, "ground", "hub.mln", "-e", "hub.db", "--engine", "duckdb") as process:
+@pytest.mark.parametrize(
+    ("arguments", "sent", "code", "said"),
+    [
+        (["ground", "--engine", "duckdb"], signal.SIGINT, 130, "interrupted\n"),
+        (["ground", "--engine", "duckdb"], signal.SIGTERM, 143, "terminated\n"),
+        (["query", "-q", "G(A1,H,A2)", "--max-memory", "8GB"], signal.SIGTERM, 143, "terminated\n"),
+    ],
+)
+def test_an_ended_join_leaves_no_files(hub, arguments, sent, code, said):
+    with command(hub, arguments[0], "hub.mln", "-e", "hub.db", *arguments[1:]) as process:
         while not list((hub / "spilled").iterdir()) and process.poll() is None:
             time.sleep(0.05)
         time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(sent)
         _, stderr = process.communicate(timeout=60)
-        assert (process.returncode, stderr) == (130, "interrupted\n")
+        assert (process.returncode, stderr) == (code, said)
     assert list((hub / "spilled").iterdir()) == []

@@ -1,4 +1,4 @@
-"""Ctrl-C: a command answers with what it has so far, and says that it was interrupted."""
+"""Ctrl-C: a command answers with what it has so far, and says that it was interrupted; SIGTERM ends it at once."""
 
 import json
 import os
@@ -51,3 +51,16 @@ def test_search(tmp_path):
     assert found["status"] == "feasible"
     assert len(found["state"]) > 900
     assert found["bound"] >= found["log_weight"]
+
+
+@pytest.mark.parametrize("options", [["--method", "gibbs", "--precision", "0.00001"], ["--task", "map"]])
+def test_sigterm_ends_a_search(tmp_path, options):
+    (tmp_path / "grid.mln").write_text(grid(400))
+    command = [sys.executable, "-m", "mlnlite", "query", "grid.mln", "-q", "S", "--time-limit", "100", *options]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(4)
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out) == (143, "")
+    assert err.endswith("terminated\n")
+    assert "Traceback" not in err

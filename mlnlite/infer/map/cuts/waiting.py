@@ -15,7 +15,8 @@ import numpy as np
 from mlnlite.engines.plan import Engine
 from mlnlite.ground.assemble import atom_range
 from mlnlite.ground.blocks import Piece
-from mlnlite.ground.ground import forecasts, ground, prepared
+from mlnlite.ground.forecast import Limits
+from mlnlite.ground.ground import NO_LIMITS, forecasts, ground, prepared
 from mlnlite.ground.lazy import violations, world_evidence
 from mlnlite.ground.merge import merged_clauses
 from mlnlite.ground.network import Bool, Clauses, Int32, Int64, Network
@@ -92,7 +93,12 @@ def _size(template: Template, evidence: Evidence) -> int:
 
 
 def without_lazy(
-    model: Model, evidence: Evidence, waiting: Sequence[int], query: Int64 | None = None, engine: Engine | None = None
+    model: Model,
+    evidence: Evidence,
+    waiting: Sequence[int],
+    query: Int64 | None = None,
+    engine: Engine | None = None,
+    limits: Limits = NO_LIMITS,
 ) -> Lazy:
     """The network of all other templates, with the atoms of the lazy ones.
 
@@ -102,13 +108,14 @@ def without_lazy(
         waiting: indices of the templates that are to wait.
         query: numbers of further atoms that are to be in the network.
         engine: what runs the grounding plans.
+        limits: what grounding may take.
     """
     others = tuple(t for i, t in enumerate(model.templates) if i not in waiting)
     expanded, completed, _ = prepared(replace(model, templates=tuple(model.templates[i] for i in waiting)), evidence)
     names = {a.predicate for t in expanded.templates for a in t.formula.atoms}
     ranges = [np.arange(*atom_range(evidence.predicates[n], completed)) for n in sorted(names)]
     asked = np.concatenate([*ranges, np.zeros(0, np.int64) if query is None else query])
-    base = ground(replace(model, templates=others), evidence, query=asked, engine=engine)
+    base = ground(replace(model, templates=others), evidence, query=asked, engine=engine, limits=limits)
     first = len(base.model.templates)
     weights = np.concatenate([base.weights, *(t.weights for t in expanded.templates)])
     sizes = [len(t.weights) for t in expanded.templates]
