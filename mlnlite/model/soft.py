@@ -23,7 +23,7 @@ class SoftColumns:
     arguments: list[NDArray[np.int32]] = field(default_factory=list)
     weight: list[NDArray[np.float64]] = field(default_factory=list)
     file: list[int] = field(default_factory=list)
-    offset: list[NDArray[np.int64]] = field(default_factory=list)
+    offset: list[NDArray[np.integer]] = field(default_factory=list)
 
     def add(
         self,
@@ -31,7 +31,7 @@ class SoftColumns:
         arguments: NDArray[np.int32],
         weight: NDArray[np.float64],
         file: int,
-        offset: NDArray[np.int64],
+        offset: NDArray[np.integer],
     ) -> None:
         """Adds some facts of one source."""
         self.database.append(database)

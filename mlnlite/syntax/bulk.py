@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from mlnlite.syntax import bulk_kernel as kernel
 from mlnlite.syntax.letters import Letters
-from mlnlite.syntax.rows import Piece, Progress, log_odds
+from mlnlite.syntax.pieces import N_COLUMNS, WIDEST, Piece, pieces_of
+from mlnlite.syntax.rows import Progress
 
 FACTS = 1 << 13
 """Facts that are gathered before they become columns."""
@@ -81,8 +82,8 @@ def _text(letters: Letters) -> kernel.Text:
 
 
 def _room() -> kernel.Found:
-    n = kernel.WIDEST + 4 * FACTS
-    rows = np.empty((FACTS, kernel.N_COLUMNS), np.int64)
+    n = WIDEST + 4 * FACTS
+    rows = np.empty((FACTS, N_COLUMNS), np.int64)
     return kernel.Found(rows, np.empty(n, np.uint64), np.empty(n, np.int64), np.empty(n, np.int32))
 
 
@@ -94,27 +95,8 @@ def _pieces(
         return
     numbers = _numbers(text, found, int(state[kernel.N_WORDS]), vocabulary)
     rows = found.rows[: state[kernel.N_FACTS]]
-    first, arity, chance = rows[:, kernel.FIRST], rows[:, kernel.ARITY], rows[:, kernel.CHANCE]
-    for mine in _alike((numbers[first].astype(np.int64) * kernel.WIDEST + arity) * kernel.N_CHANCES + chance):
-        facts = rows[mine]
-        words, n, kind = facts[:, kernel.FIRST], int(facts[0, kernel.ARITY]), int(facts[0, kernel.CHANCE])
-        yield Piece(
-            vocabulary.text(numbers[words[0]]),
-            tuple(numbers[words + 1 + i] for i in range(n)),
-            facts[:, kernel.TRUTH].astype(np.bool_),
-            facts[:, kernel.IN_DATABASE].astype(np.int32),
-            (start + facts[:, kernel.BEGIN]).astype(np.int32 if start < 1 << 30 else np.int64),
-            _weights(numbers[words + 1 + n], vocabulary) if kind == kernel.NUMBER else _weight(kind, len(facts)),
-        )
+    yield from pieces_of(rows, numbers, lambda i: vocabulary.text(numbers[i]), start)
     state[[kernel.N_FACTS, kernel.N_WORDS]] = 0
-
-
-def _alike(keys: NDArray[np.int64]) -> list[NDArray[np.int64]] | list[slice]:
-    """The rows of each key."""
-    if (keys == keys[0]).all():
-        return [slice(None)]
-    order = np.argsort(keys, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(keys[order])) + 1)
 
 
 def _numbers(text: kernel.Text, found: kernel.Found, n: int, vocabulary: Vocabulary) -> NDArray[np.int32]:
@@ -133,13 +115,3 @@ def _with_room(words: kernel.Words) -> kernel.Words:
     table = np.zeros((2 * len(words.table), 2), np.int64)
     kernel.enter(words.table, table)
     return kernel.Words(letters, begins, table)
-
-
-def _weight(kind: int, n: int) -> NDArray[np.float64] | None:
-    return np.zeros(n) if kind == kernel.UNKNOWN else None
-
-
-def _weights(numbers: NDArray[np.int32], vocabulary: Vocabulary) -> NDArray[np.float64]:
-    """Log-odds of the numbers in front of facts."""
-    distinct, which = np.unique(numbers, return_inverse=True)
-    return np.array([log_odds(float(vocabulary.text(n))) for n in distinct.tolist()])[which]

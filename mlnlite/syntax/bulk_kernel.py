@@ -12,20 +12,15 @@ from numpy.typing import NDArray
 
 from mlnlite.compiled import compiled, compiled_part
 from mlnlite.syntax.letters import PADDING
+from mlnlite.syntax.pieces import ARITY, BEGIN, CERTAIN, CHANCE, FIRST, IN_DATABASE, NUMBER, TRUTH, UNKNOWN, WIDEST
 
 LONGEST = PADDING // 2
 """Bytes of the longest word that is read here."""
-WIDEST = 64
-"""Words of the longest fact that is read here."""
 END, FULL, LEFT = range(3)
 """Why reading stops: all is read; no room for more facts; lines are left that are no such facts."""
 POSITION, SKIPPED, DATABASE, SEPARATOR, FIRST_LEFT, N_FACTS, N_WORDS, N_STATE = range(8)
 """The state: the next byte; how many bytes before it go on with a character; the database; whether `---` was read last;
 the character from which on lines are left, or -1; how many facts there are, and how many words these have."""
-BEGIN, FIRST, ARITY, TRUTH, CHANCE, IN_DATABASE, N_COLUMNS = range(7)
-"""Columns of a fact: where it begins, in characters; its first word, the predicate, which arguments follow; how many
-these are; whether it is true; whether a number in front is the word behind the arguments, there is none, or `?`."""
-NUMBER, CERTAIN, UNKNOWN, N_CHANCES = range(4)
 
 
 class Text(NamedTuple):

@@ -17,8 +17,10 @@ from mlnlite.syntax.includes import ANY_INCLUDE, File, load
 from mlnlite.syntax.letters import LargeFile, Letters, letters_of
 from mlnlite.syntax.lines import split_facts
 from mlnlite.syntax.messages import mistake
+from mlnlite.syntax.pieces import Piece, log_odds
 from mlnlite.syntax.place import Place
-from mlnlite.syntax.rows import Piece, Progress, Rows, log_odds
+from mlnlite.syntax.plain import Tokens, read_plain
+from mlnlite.syntax.rows import Progress, Rows
 from mlnlite.syntax.tree import TypeDeclaration
 
 if TYPE_CHECKING:
@@ -27,15 +29,6 @@ if TYPE_CHECKING:
 MAX_MISTAKES = 100
 BULK = 1 << 22
 """Characters from which on facts are read by compiled code, which takes .4 s to load."""
-# A fact on a line of its own, without escapes in quotes: a subset of what the grammar accepts.
-_WORD = r"-?\w(?:[\w\'$~\\]|[-.:;/](?=\w))*+"
-_TERM = rf'(?:{_WORD}|"[^"\\\n]*+")'
-_FACT = re.compile(
-    rf"^[ \t]*+(!|\?|0\.\d*[1-9]\d*[ \t]++)?(?:({_TERM})[ \t]*+=[ \t]*+)?([^\W\d]\w*+)"
-    rf"\(([ \t]*+{_TERM}[ \t]*+(?:,[ \t]*+{_TERM}[ \t]*+)*+)\)[ \t\r]*+$",
-    re.MULTILINE,
-)
-_EACH = re.compile(_TERM)
 _VALUE = re.compile(r'(?:-?\w[\w.:/$-]*|"(?:[^"\\\n]|\\[^\n])*")\s*=(?!\s*\{)')
 _TYPE = re.compile(r"[^\W\d][\w'-]*\s*=\s*\{")
 
@@ -45,6 +38,7 @@ class _Reading:
     """What has been read so far.
 
     Attributes:
+        tokens: the words that a pattern has met.
         rows: the facts.
         progress: where reading is.
         types: the type declarations.
@@ -52,6 +46,7 @@ class _Reading:
         vocabulary: the words that compiled code has met.
     """
 
+    tokens: Tokens = field(default_factory=Tokens)
     rows: Rows = field(default_factory=Rows)
     progress: Progress = field(default_factory=Progress)
     types: list[TypeDeclaration] = field(default_factory=list)
@@ -68,6 +63,7 @@ def parse_evidence(source: Source) -> EvidenceProgram:
         SyntaxMistake: with every mistake in the file.
     """
     reading = _Reading()
+    reading.rows.words = reading.tokens.words
     start = _read_plain(source, reading) if isinstance(source, LargeFile) else 0
     if start is not None:
         file = load(source)
@@ -109,33 +105,18 @@ def _read_bulk(source: Source, chunks: Iterable[Letters], start: int, reading: _
     reading.vocabulary = reading.vocabulary or Vocabulary()
     for found in read_bulk(chunks, start, reading.progress, reading.vocabulary):
         if isinstance(found, Piece):
-            reading.rows.add_piece(source, found)
+            reading.rows.add_bulk(source, found)
         else:
             yield found
 
 
 def _read_lines(file: File, start: int, end: int, reading: _Reading) -> None:
-    """Plain facts by one pattern, the stretches between them statement by statement."""
-    done, text, source, add = start, file.code.text, file.code.source, reading.rows.add
-    for match in _FACT.finditer(text, start, end):
-        sign, value, predicate, arguments = match.groups()
-        if value and sign:
-            continue
-        begin = match.start(1) if sign else match.start(2) if value else match.start(3)
-        if begin - done > 1:
-            _read_between(file, done, begin, reading)
-            if len(reading.mistakes) > MAX_MISTAKES:
-                return
-        done = match.end()
-        words = _EACH.findall(arguments)
-        if value:
-            words.append(value)
-        if '"' in match[0]:
-            words = [word.strip('"') for word in words]
-        truth = sign is None if sign in (None, "!") else 0.0 if sign == "?" else log_odds(float(sign))
-        add(source, (predicate, words), truth, (reading.progress.database, begin))
-        reading.progress.separator = False
-    _read_between(file, done, end, reading)
+    """Plain facts by a pattern, the stretches between them statement by statement."""
+    for found in read_plain(file.code.text, start, end, reading.progress, reading.tokens):
+        if isinstance(found, Piece):
+            reading.rows.add_piece(file.code.source, found)
+        elif len(reading.mistakes) <= MAX_MISTAKES:
+            _read_between(file, *found, reading)
 
 
 def _read_between(file: File, start: int, end: int, reading: _Reading) -> None:

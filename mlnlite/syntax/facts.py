@@ -31,7 +31,7 @@ class FactTable:
     truth: NDArray[np.bool_]
     database: NDArray[np.int32]
     weight: NDArray[np.float64] | None = None
-    offset: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), repr=False)
+    offset: NDArray[np.integer] = field(default_factory=lambda: np.empty(0, np.int64), repr=False)
     source: Source = field(default_factory=lambda: Source("<facts>", ""), repr=False)
 
     def __eq__(self, other: object) -> bool:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.source import Source
-from mlnlite.syntax.coded import Coded, Codes
+from mlnlite.syntax.coded import Coded
 from mlnlite.syntax.facts import FactTable
+from mlnlite.syntax.pieces import Piece
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -25,27 +26,6 @@ class Progress:
 
     database: int = 0
     separator: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """Facts about one predicate with one number of arguments.
-
-    Attributes:
-        predicate: its name.
-        words: one for each argument, shape (n,), numbers of words.
-        truth: shape (n,).
-        database: shape (n,).
-        offset: shape (n,), where in the source each starts.
-        weight: shape (n,), log-odds of soft evidence, or None.
-    """
-
-    predicate: str
-    words: tuple[Codes, ...]
-    truth: NDArray[np.bool_]
-    database: NDArray[np.int32]
-    offset: NDArray[np.int64]
-    weight: NDArray[np.float64] | None = None
 
 
 @dataclass(slots=True)
@@ -68,13 +48,17 @@ class Rows:
     """All facts so far, by table.
 
     Attributes:
+        words: the words that those not read in bulk consist of, and their numbers.
         pieces: facts that came in pieces.
+        bulk: those that came in bulk.
         single: facts that came one by one.
         large: pieces that became one, so that their memory serves others.
-        n: how many facts there are in `pieces`.
+        n: how many facts there are in `bulk`.
     """
 
+    words: dict[str, int] = field(default_factory=dict)
     pieces: dict[_Key, list[Piece]] = field(default_factory=dict)
+    bulk: dict[_Key, list[Piece]] = field(default_factory=dict)
     single: dict[_Key, _Single] = field(default_factory=dict)
     large: list[tuple[_Key, Piece]] = field(default_factory=list)
     n: dict[_Key, int] = field(default_factory=dict)
@@ -102,9 +86,15 @@ class Rows:
         rows.offset.append(place[1])
 
     def add_piece(self, source: Source, piece: Piece) -> None:
-        """Adds many facts."""
+        """Adds some facts, whose words have numbers in `words`."""
         key = source, piece.predicate, len(piece.words), piece.weight is not None
-        pieces = self.pieces.setdefault(key, [])
+        self.pieces.setdefault(key, []).append(piece)
+
+    def add_bulk(self, source: Source, piece: Piece) -> None:
+        """Adds many facts, whose words have numbers of their own."""
+        key = source, piece.predicate, len(piece.words), piece.weight is not None
+        self.pieces.setdefault(key, [])
+        pieces = self.bulk.setdefault(key, [])
         pieces.append(piece)
         self.n[key] = self.n.get(key, 0) + len(piece.truth)
         if self.n[key] >= LARGE:
@@ -112,13 +102,19 @@ class Rows:
             self.n[key] = 0
 
     def tables(self, words: Sequence[str] = ()) -> list[FactTable]:
-        """All facts, as tables in the order of their sources and first facts; `words`: those that pieces number."""
+        """All facts, as tables in the order of their sources and first facts; `words`: those of the facts in bulk."""
         sources = {id(key[0]): rank for rank, key in reversed(list(enumerate(self.pieces)))}
-        numbers = dict(zip(words, range(len(words)), strict=True)) if self.single else {}
         for key, single in self.single.items():
-            self.pieces[key].append(_piece(key, single, numbers))
-        names = list(numbers) if numbers else words
-        rest = [(key, _whole(pieces)) for key, pieces in self.pieces.items() if pieces]
+            self.pieces[key].append(_piece(key, single, self.words))
+        names = words or list(self.words)
+        if self.words and words:
+            numbers = dict(zip(words, range(len(words)), strict=True))
+            number = np.array([numbers.setdefault(word, len(numbers)) for word in self.words], np.int32)
+            names = list(numbers)
+            for pieces in self.pieces.values():
+                pieces[:] = [replace(p, words=tuple(number[w] for w in p.words)) for p in pieces]
+        rest = [(key, _whole(parts)) for key, p in self.pieces.items() if (parts := self.bulk.get(key, []) + p)]
+        self.bulk.clear()
         tables = [_table(key, piece, names) for key, piece in [*self.large, *rest]]
         return sorted(tables, key=lambda table: (sources[id(table.source)], table.offset[0]))
 
@@ -160,12 +156,3 @@ def _joined(parts: list[NDArray[Number]]) -> NDArray[Number]:
     whole: NDArray[Number] = np.concatenate(parts)
     parts.clear()
     return whole
-
-
-def log_odds(probability: float) -> float:
-    """The weight of soft evidence.
-
-    >>> log_odds(0.5)
-    0.0
-    """
-    return float(np.log(probability) - np.log1p(-probability))

@@ -72,6 +72,17 @@ LINES = (
     "P(C) */",
     "P(a/b, c) //",
     "P(a//b, c)",
+    "- 1 = f(A)",
+    "-1 = f(A)",
+    "0.7 = f(A)",
+    "0.7 x = f(A)",
+    "!x = f(A)",
+    '"" = f("---")',
+    "\t---\t",
+    "P(\\u2028)",
+    "\x0cP(A)",
+    "\xa0P(A)",
+    '?P(A, "?(")',
     '#include "x.db"',
     "=",
     "\x01P(A)",
@@ -94,7 +105,7 @@ def path(tmp_path_factory):
 
 
 def compare(text, path):
-    """By a pattern; by compiled code; as a large file, which is read as bytes until a line needs the grammar."""
+    """By a pattern; by compiled code; as a large file, read as bytes until a line needs the grammar; by the grammar."""
     with open(path, "w", newline="") as file:
         file.write(text)
     sources = [Source(path, text)] + ([read_source(path), LargeFile(path)] if text.strip() else [])
@@ -110,6 +121,9 @@ def compare(text, path):
         expected = [read(source) for source in sources]
         patch.setattr(evidence, "BULK", 0)
         assert [read(source) for source in sources] == expected
+        patch.setattr(evidence, "BULK", 10**9)
+        patch.setattr(evidence, "read_plain", lambda text, start, end, *_: iter([(start, end)]))
+        assert [read(source) for source in sources[:1]] == expected[:1]
     assert expected[1:2] == expected[2:]
 
 
