@@ -39,6 +39,11 @@ class How:
     database_weights: tuple[float, ...] | None = None
 
 
+def targets_of(model: Model, how: How) -> frozenset[str]:
+    """The predicates that are predicted; comparisons never are."""
+    return frozenset(n for n, p in model.predicates.items() if p.comparison is None and n in (how.predict or [n]))
+
+
 @dataclass(frozen=True, slots=True)
 class LearnedModel:
     """A model with learnt weights.

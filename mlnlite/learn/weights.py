@@ -86,7 +86,7 @@ def how_of(
 ) -> How:
     """What is to be learnt, as the learnt model remembers it; `names` are those of what is predicted and open."""
     predict = None if names[0] is None else predicates_named(model, names[0], "predict")
-    unknown = predicates_named(model, frozenset(names[1]), "leave open")
+    unknown = opened(model, names[1])
     return How(
         _objective(objective, unknown, model, databases, predicates_named(model, predict, "predict")),
         None if predict is None else tuple(sorted(predict)),
@@ -134,6 +134,19 @@ def with_constants(model: Model, databases: Evidence) -> Model:
     """A model with the types of the learnt one: the databases' constants come in where there is a weight for each."""
     keys = {t.formula.variables[k].type for t in model.templates for k in t.keys}
     return replace(model, types={n: databases.types[n] if n in keys else t for n, t in model.types.items()})
+
+
+def opened(model: Model, names: Iterable[str]) -> frozenset[str]:
+    """Predicates to leave open.
+
+    Raises:
+        QueryMistake: if there is none of a name, or its declaration closes its world.
+    """
+    found = predicates_named(model, frozenset(names), "leave open")
+    for name in sorted(n for n in found if model.predicates[n].closed):
+        hint = "remove the star from its declaration"
+        raise QueryMistake(f"{name} cannot be left open: {model.predicates[name]} has a closed world", hint)
+    return found
 
 
 def predicates_named(model: Model, given: Iterable[str] | None, what: str) -> frozenset[str]:

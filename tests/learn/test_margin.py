@@ -66,6 +66,23 @@ def test_margin_equals_listing(text, databases, targets):
     assert learned.value == pytest.approx(learned.weights @ learned.weights / 8 - value(learned.weights), abs=1e-5)
 
 
+def test_margin_beside_fixed_weights():
+    text = "P(a)\nQ(a)\n#fixweight\n2.5 P(x) => Q(x)\n#fixweight\n-1 Q(x)\nP(x)\nP(x) ^ Q(x)\n"
+    model = ml.model_from_text(text)
+    data = ml.evidence_from_text("P(A)\nQ(B)\nP(D)\nQ(D)\n---\nP(A)", model=model)
+    learned = ml.learn(model, data, objective="max-margin", prior=2.0)
+    cuts = every_cut(learned.model, data, ["P", "Q"])
+
+    def value(free):
+        w = np.array([2.5, -1.0, *free])
+        return free @ free / 8 + sum(max(loss - change @ w for loss, change in one) for one in cuts)
+
+    grid = np.linspace(-3, 3, 61)
+    lowest = min(value(np.array([a, b])) for a in grid for b in grid)
+    assert learned.status == "converged"
+    assert value(learned.weights[2:]) <= lowest + 1e-5
+
+
 def test_margin_needs_a_gaussian_prior_and_complete_data():
     model = ml.model_from_text("P(a)\nP(x)\n")
     data = ml.evidence_from_text("P(A)", model=model)

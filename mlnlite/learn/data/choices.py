@@ -8,6 +8,7 @@ and equal choices are kept once: what is left is often a handful.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,5 +158,7 @@ def _no_value(predicate: Predicate, block: int, evidence: Evidence) -> EvidenceM
     name, arguments = evidence.atom_at(within + evidence.first_atom()[predicate.name])
     constants = [evidence.types[predicate.types[k]].constants[arguments[k]] for k in predicate.keys]
     message = f"{name}({', '.join([*constants, '...'])}) has no value in {evidence.names[world]}"
-    hint = f"{predicate} has exactly one true value for each block, and learning needs to know which"
+    hint = (
+        f"{replace(predicate, closed=False)} has exactly one true value for each block; say which, or mark it unknown"
+    )
     return EvidenceMistake([Diagnostic("E320", message, predicate.span, hint)])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.engines.plan import Count, Plan, Run
+from mlnlite.errors import Contradiction, Diagnostic
 from mlnlite.ground.compile import Source, bindings, with_number
 from mlnlite.ground.ground import source_of
 from mlnlite.learn.data.separate import Case, cases
@@ -58,6 +59,9 @@ def entries(
         evidence: complete: every atom that is not a fact is false.
         load: as said there.
         targets: predicates whose atoms are counted for.
+
+    Raises:
+        Contradiction: if the data violate a hard formula.
     """
     found: dict[str, list[Entries]] = {name: [] for name in targets}
     loaded: dict[bytes, tuple[Evidence, Run]] = {}
@@ -68,12 +72,26 @@ def entries(
                 loaded[databases.tobytes()] = part, load(part)
             part, run = loaded[databases.tobytes()]
             source = source_of(i, template, part, "database" if part.n_databases > 1 else None)
+            if template.hard:
+                _verify_holds(template, source, run)
             for sign, case in _cases(source):
                 for target, (schema, _) in enumerate(case.literals):
                     if schema.predicate in targets:
                         counted = _counted(source, case, target, sign, int(first[i]), run)
                         found[schema.predicate] += [replace(e, database=databases[e.database]) for e in counted]
     return found
+
+
+def _verify_holds(template: Template, source: Source, run: Run) -> None:
+    for cube in cubes(source.formula.body, False):
+        if run(Count(bindings(source, cube, source.formula.free), ()))["count"].any():
+            raise violated(template)
+
+
+def violated(template: Template) -> Contradiction:
+    """What to say if the data violate a hard formula."""
+    message = f"the data violate {template.name}, which is hard: {template.text}"
+    return Contradiction([Diagnostic("E404", message, template.span, "give it a weight, or mend the data")])
 
 
 def _alike(template: Template, evidence: Evidence) -> list[Int64]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mlnlite.engines.plan import Relation
 from mlnlite.errors import LimitReached
 from mlnlite.ground.compile import Source, affine
-from mlnlite.ground.counting import AT_ONCE, WIDEST_CASE, holds, state_of
+from mlnlite.ground.counting import AT_ONCE, WIDEST_CASE, State, holds, state_of
 from mlnlite.ground.residual import atoms_in, equalities_in, truth_table
 from mlnlite.learn.data.missing import blocks_of
 from mlnlite.model.evidence import Evidence
@@ -75,20 +75,40 @@ def flips(source: Source, rows: Relation, data: Evidence, name: str) -> Flips:
     Raises:
         LimitReached: if the formula has too many states, or a case too many atoms.
     """
+    state, cases, columns = _layout(source)
+    found = [Flips(*(np.empty(0, np.int64) for _ in range(3)))]
+    for part, n in _parts(rows, len(columns)):
+        world = _world(source, part, data, (name, columns), n)
+        found.append(_changes(cases, world, state.true, part))
+    return Flips(*map(np.concatenate, zip(*found, strict=True)))
+
+
+def holds_everywhere(source: Source, rows: Relation, data: Evidence) -> bool:
+    """Whether a formula is true for all its bindings in the data; arguments as for `flips`."""
+    state, cases, columns = _layout(source)
+    for part, n in _parts(rows, len(columns)):
+        world = _world(source, part, data, ("", columns), n)
+        if not state.true[_state(cases, world)].all():
+            return False
+    return True
+
+
+def _layout(source: Source) -> tuple[State, list[_Cases], dict[Proposition, int]]:
+    """The digits of a formula's state, what adds to them, and the columns of propositions."""
     state = state_of(source)
     columns: dict[Proposition, int] = {AtomRef(i): i for i in range(len(source.formula.atoms))}
     every: list[tuple[Expression, int]] = [*zip(state.plain, state.plain_steps, strict=True)]
     for counted, step in zip(source.counted, state.counted_steps, strict=True):
         every += [(case, step) for case in counted.cases]
-    cases = _alike(every, columns)
+    return state, _alike(every, columns), columns
+
+
+def _parts(rows: Relation, n_columns: int) -> Iterator[tuple[Relation, int]]:
+    """Bindings in parts, and the length of each."""
     n = len(next(iter(rows.values()))) if rows else 1
-    at_once = max(1, AT_ONCE // max(1, len(columns)))
-    found = [Flips(*(np.empty(0, np.int64) for _ in range(3)))]
+    at_once = max(1, AT_ONCE // max(1, n_columns))
     for start in range(0, n, at_once):
-        part = {key: values[start : start + at_once] for key, values in rows.items()}
-        world = _world(source, part, data, (name, columns), min(at_once, n - start))
-        found.append(_changes(cases, world, state.true, part))
-    return Flips(*map(np.concatenate, zip(*found, strict=True)))
+        yield {key: values[start : start + at_once] for key, values in rows.items()}, min(at_once, n - start)
 
 
 def _alike(every: list[tuple[Expression, int]], columns: dict[Proposition, int]) -> list[_Cases]:
@@ -127,17 +147,16 @@ def _world(source: Source, rows: Relation, data: Evidence, of: tuple[str, dict[P
         true = data.atom_number(predicate, facts.arguments[facts.truth])
         truth[:, places] = np.isin(number[:, places], true)
     number[:, : len(names)][:, names != name] = -1
-    block = np.where(number >= 0, blocks_of(data, data.predicates[name], number), -1)
+    block = np.where(number >= 0, blocks_of(data, data.predicates[name], number), -1) if name else number
     return _World(number, block, truth)
 
 
 def _changes(cases: list[_Cases], world: _World, true: Int64, rows: Relation) -> Flips:
     """The atom true against its block without a value, for each binding and atom."""
-    state = np.zeros(len(world.atom), np.int64)
+    state = _state(cases, world)
     atoms, blocks = [np.empty((4, 0), np.int64)], [np.empty((3, 0), np.int64)]
     for some in cases:
         now = some.true[_code(world.truth[:, some.propositions])]
-        state += now @ some.step
         for j in range(some.propositions.shape[1]):
             atom, block = _again(some, world, now, j)
             atoms.append(atom)
@@ -157,6 +176,14 @@ def _changes(cases: list[_Cases], world: _World, true: Int64, rows: Relation) ->
         np.zeros(len(kept), np.int64) if row is None else row[binding].astype(np.int64),
         change if count is None else change * count[binding],
     )
+
+
+def _state(cases: list[_Cases], world: _World) -> Int64:
+    """The state of the formula for each binding."""
+    state = np.zeros(len(world.atom), np.int64)
+    for some in cases:
+        state += some.true[_code(world.truth[:, some.propositions])] @ some.step
+    return state
 
 
 def _code(truth: Bool) -> Int64:

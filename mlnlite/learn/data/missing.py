@@ -82,11 +82,10 @@ def closed_but(data: Evidence, names: Collection[str], marks: Marks) -> Evidence
 
 def _with_false(data: Evidence, predicate: Predicate, marks: Int64) -> Facts:
     """The facts about a predicate, and that its atoms are false that are neither facts nor marked."""
-    present = [np.flatnonzero(data.present[t][0]) for t in predicate.types]
-    if prod(map(len, present)) > MOST_ATOMS:
+    if prod(int(data.present[t].sum()) for t in predicate.types) > MOST_ATOMS:
         hint = f"leave the whole predicate open (`--open {predicate.name}`), or learn without its marks"
         raise LimitReached(f"{predicate.name} has too many atoms for single ones to be left open", hint)
-    grid = np.stack(np.meshgrid(*present, indexing="ij"), axis=-1).reshape(-1, predicate.arity).astype(np.int32)
+    grid = every_atom(data, predicate)
     table = data.facts[predicate.name]
     atoms, known = data.atom_number(predicate.name, grid), data.atom_number(predicate.name, table.arguments)
     false = ~np.isin(atoms, known) & ~np.isin(atoms, marks)
@@ -97,6 +96,15 @@ def _with_false(data: Evidence, predicate: Predicate, marks: Int64) -> Facts:
     order = np.argsort(np.concatenate([known, atoms[false]]), kind="stable")
     truth = np.concatenate([table.truth, np.zeros(int(false.sum()), np.bool_)])
     return Facts(np.zeros(len(every), np.int32), every[order], truth[order])
+
+
+def every_atom(data: Evidence, predicate: Predicate) -> NDArray[np.int32]:
+    """The arguments of all atoms of a predicate in one database, shape (n_atoms, arity), in order."""
+    present = [np.flatnonzero(data.present[t][0]) for t in predicate.types]
+    n_atoms = prod(map(len, present))
+    places = np.unravel_index(np.arange(n_atoms), [len(p) for p in present]) if present else ()
+    columns = [p[at] for p, at in zip(present, places, strict=True)]
+    return np.array(columns, np.int32).reshape(predicate.arity, n_atoms).T
 
 
 def blocks_of(data: Evidence, predicate: Predicate, atoms: Int64) -> Int64:

@@ -166,12 +166,13 @@ def conditions(databases: Evidence, index: int, targets: frozenset[str], unknown
 
 
 def _hidden(data: Evidence, targets: frozenset[str]) -> Evidence:
-    """The data without the facts about the targets."""
-    facts = dict(data.facts)
+    """The data without the facts about the targets, and these open."""
+    facts, predicates = dict(data.facts), dict(data.predicates)
     for name in targets:
         arity = data.predicates[name].arity
         facts[name] = Facts(np.empty(0, np.int32), np.empty((0, arity), np.int32), np.empty(0, np.bool_))
-    return replace(data, facts=facts)
+        predicates[name] = replace(data.predicates[name], closed=False)
+    return replace(data, facts=facts, predicates=predicates)
 
 
 def labels_of(network: Network, data: Evidence, complete: frozenset[str], marks: Marks) -> Labels:

@@ -53,7 +53,7 @@ class Cut:
     """`slack >= loss - w change` for all weights.
 
     Attributes:
-        loss: of the worlds that make it.
+        loss: of the worlds that make it, and what fixed weights give them more than the data.
         change: shape (n_free,), counts in the data less those in the worlds.
     """
 
@@ -164,12 +164,12 @@ def _most_violating(
 ) -> tuple[Cut, float]:
     """The worlds that violate most at some weights, as one cut, and a bound on how much any do."""
     weights = np.append(base + share @ x, 1.0)
-    soft = np.isfinite(weights[:-1])
+    soft, fixed = np.isfinite(weights[:-1]), np.where(np.isfinite(base), base, 0.0)
     loss, change, bound = 0.0, np.zeros(share.shape[1]), 0.0
     for one in databases:
         world = map_of(replace(one.network, weights=weights), seed=seed)
         found = counts(one.network, world.truth)
-        loss += one.times * float(found[-1] + one.untouched)
+        loss += one.times * float(found[-1] + one.untouched + fixed @ (found[:-1] - one.counts))
         change += one.times * (share.T @ (one.counts - found[:-1]))
         bound += one.times * (world.bound + one.untouched - float(weights[:-1][soft] @ one.counts[soft]))
     return Cut(loss, change), bound

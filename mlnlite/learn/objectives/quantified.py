@@ -14,8 +14,8 @@ from mlnlite.ground.counting import counting_plan
 from mlnlite.ground.ground import counted_source, row_tables
 from mlnlite.ground.tables import completed, tables_of
 from mlnlite.learn.data.content import content
-from mlnlite.learn.data.counts import Entries
-from mlnlite.learn.data.flips import flips
+from mlnlite.learn.data.counts import Entries, violated
+from mlnlite.learn.data.flips import flips, holds_everywhere
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
 from mlnlite.model.model import Model
@@ -52,6 +52,7 @@ def counted_entries(
         engine: what runs the plans.
 
     Raises:
+        Contradiction: if the data violate the formula, which is hard.
         LimitReached: what is counted has too many atoms, or the formula too many states.
     """
     found: dict[str, list[Entries]] = {name: [] for name in targets}
@@ -66,6 +67,8 @@ def counted_entries(
             source = counted_source(number, template, data)
             run = (engine or engine_for()).load({**tables_of(data), **row_tables(model)})
             sources[constants] = source, run(counting_plan(source, ({},)).plan)
+        if template.hard and not holds_everywhere(*sources[constants], data):
+            raise violated(template)
         for name in sorted(targets & used):
             changes = flips(*sources[constants], data, name)
             database = np.full(len(changes.atom), i, np.int64)

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mlnlite.errors import Contradiction, Diagnostic, ModelMistake
+from mlnlite.errors import ModelMistake
+from mlnlite.learn.data.counts import violated
 from mlnlite.learn.data.merge import Choices
 from mlnlite.learn.data.wide import Wide, wide_value
 from mlnlite.learn.optimise import likelihood
@@ -115,9 +116,7 @@ def _possible(model: Model, rows: sparse.csc_array, hard: NDArray[np.bool_]) -> 
         row = change[[int(np.flatnonzero(lowest < 0)[0])]].tocoo()
         column = int(columns[row.col[row.data < 0][0]])
         sizes = np.cumsum([len(t.weights) for t in model.templates])
-        template = model.templates[int(np.searchsorted(sizes, column, "right"))]
-        message = f"the data violate {template.name}, which is hard: {template.text}"
-        raise Contradiction([Diagnostic("E404", message, template.span, "give it a weight, or mend the data")])
+        raise violated(model.templates[int(np.searchsorted(sizes, column, "right"))])
     return np.flatnonzero(np.asarray(change.max(axis=1).todense()).reshape(-1) <= 0)
 
 

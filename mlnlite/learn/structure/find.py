@@ -29,7 +29,7 @@ from mlnlite.learn.prior import Penalty
 from mlnlite.learn.structure.candidates import Language, candidates, rule_text
 from mlnlite.learn.structure.impute import Hidden, completions, hidden, problem_with
 from mlnlite.learn.structure.modes import modes_of
-from mlnlite.learn.weights import predicates_named
+from mlnlite.learn.weights import opened
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import AtomRef
 from mlnlite.model.model import Model
@@ -122,7 +122,7 @@ def find_rules(  # noqa: PLR0913
     heads = modes_of(predict, model.predicates)
     bodies = modes_of(model.predicates if given is None else given, model.predicates)
     targets = target_names(databases, {mode.predicate: None for mode in heads})
-    unknown = predicates_named(model, frozenset(open_predicates), "leave open")
+    unknown = opened(model, open_predicates)
     language = Language(model.predicates, databases.types, heads, bodies)
     rules = tuple(rule_text(rule, model.dialect) for rule in candidates(language, most_literals))
     if not rules:

@@ -18,14 +18,14 @@ from mlnlite.ground.ground import ground
 from mlnlite.ground.network import Network
 from mlnlite.learn.data.content import content
 from mlnlite.learn.data.merge import Listed, merged
-from mlnlite.learn.data.missing import MOST_ATOMS, blocks_of
+from mlnlite.learn.data.missing import MOST_ATOMS, blocks_of, every_atom
 from mlnlite.learn.objectives.choose import pseudo_listed
 from mlnlite.learn.objectives.exact import labelled
 from mlnlite.learn.objectives.quantified import without_weights
 from mlnlite.learn.optimise.problem import Problem, problem_of
 from mlnlite.learn.optimise.solve import best
 from mlnlite.learn.prior import Gaussian, penalty_of
-from mlnlite.learn.trust.simulate import all_atoms, draw_worlds, with_facts
+from mlnlite.learn.trust.simulate import draw_worlds, with_facts
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.model.symbols import Predicate
@@ -73,7 +73,7 @@ def _unknown(data: Evidence, predicate: Predicate) -> Int64:
     if np.prod([int(data.present[t].sum()) for t in predicate.types], dtype=object) > MOST_ATOMS:
         hint = "mark single atoms, or learn without this predicate"
         raise LimitReached(f"{predicate.name} has too many unknown atoms to look for rules", hint)
-    facts, every = data.facts[predicate.name], all_atoms(data, frozenset([predicate.name]))
+    facts, every = data.facts[predicate.name], data.atom_number(predicate.name, every_atom(data, predicate))
     known = data.atom_number(predicate.name, facts.arguments)
     settled = known if predicate.value is None else blocks_of(data, predicate, known[facts.truth])
     return every[~np.isin(every, known) & ~np.isin(blocks_of(data, predicate, every), settled)]

@@ -11,7 +11,7 @@ from mlnlite.ground.ground import ground
 from mlnlite.ground.network import Network
 from mlnlite.learn.data.merge import Listed, merged
 from mlnlite.learn.data.worlds import components
-from mlnlite.learn.learned import How
+from mlnlite.learn.learned import How, targets_of
 from mlnlite.learn.objectives.choose import pseudo_listed, tied_of, worth_of
 from mlnlite.learn.objectives.exact import compiled, conditions
 from mlnlite.learn.objectives.quantified import without_weights
@@ -35,7 +35,7 @@ def clustered(model: Model, databases: Evidence, how: How) -> tuple[Problem, int
         databases: the data.
         how: what is learnt.
     """
-    targets = frozenset(model.predicates if how.predict is None else how.predict)
+    targets = targets_of(model, how)
     n_weights = sum(len(t.weights) for t in model.templates)
     tied, worth = tied_of(model, how.tied), worth_of(databases, how.database_weights)
     apart = databases.n_databases < ENOUGH

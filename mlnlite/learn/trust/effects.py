@@ -11,7 +11,7 @@ from scipy import sparse
 from mlnlite.errors import LimitReached, QueryMistake
 from mlnlite.learn.data.merge import Choices
 from mlnlite.learn.data.missing import is_incomplete
-from mlnlite.learn.learned import How, LearnedModel, Objective
+from mlnlite.learn.learned import How, LearnedModel, Objective, targets_of
 from mlnlite.learn.objectives.choose import task_of
 from mlnlite.learn.optimise import information
 from mlnlite.learn.optimise.problem import Problem, log_likelihood
@@ -121,11 +121,7 @@ def _bend(found: Choices, x: Float, column: int) -> tuple[Float, float]:
 
 def has_unknown(model: Model, databases: Evidence, how: How) -> bool:
     """Whether databases leave atoms unknown that matter to a learnt model."""
-    return bool(how.open_predicates) or is_incomplete(model, databases, _targets(model, how))
-
-
-def _targets(model: Model, how: How) -> frozenset[str]:
-    return frozenset(model.predicates if how.predict is None else how.predict)
+    return bool(how.open_predicates) or is_incomplete(model, databases, targets_of(model, how))
 
 
 def held_out(learned: LearnedModel, databases: Evidence) -> float:
@@ -150,4 +146,4 @@ def unseen(model: Model, databases: Evidence, how: How) -> Problem:
     objective: Objective = "likelihood" if has_unknown(model, databases, how) else "pseudo-likelihood"
     how = replace(how, objective=objective, tied=(), database_weights=None)
     free = (replace(t.expanded(databases.types), fixed=t.hard) for t in model.templates)
-    return task_of(replace(model, templates=tuple(free)), databases, how, _targets(model, how), None).problem
+    return task_of(replace(model, templates=tuple(free)), databases, how, targets_of(model, how), None).problem

@@ -11,9 +11,9 @@ from scipy import sparse
 
 from mlnlite.ground.ground import ground
 from mlnlite.ground.network import Network
-from mlnlite.learn.data.missing import blocks_of
+from mlnlite.learn.data.missing import blocks_of, every_atom
 from mlnlite.learn.data.worlds import MOST_WORLDS, components, incidence, n_worlds, world_counts
-from mlnlite.learn.learned import LearnedModel
+from mlnlite.learn.learned import LearnedModel, targets_of
 from mlnlite.learn.objectives.chains import new_chains, sweep
 from mlnlite.learn.objectives.exact import conditions
 from mlnlite.model.evidence import Evidence, Facts
@@ -43,7 +43,7 @@ def simulate(
     Returns:
         Whether some component was too wide to be drawn from exactly, and the databases.
     """
-    targets = frozenset(learned.model.predicates if learned.how.predict is None else learned.how.predict)
+    targets = targets_of(learned.model, learned.how)
     unknown = frozenset(learned.how.open_predicates)
     draws = []
     for i in range(databases.n_databases):
@@ -125,12 +125,8 @@ def _blocks(data: Evidence, predicate: Predicate, arguments: NDArray[np.int32]) 
 
 def all_atoms(evidence: Evidence, targets: frozenset[str]) -> Int64:
     """Numbers of all atoms of the targets."""
-    found = [np.empty(0, np.int64)]
-    for name in targets:
-        ids = [np.flatnonzero(evidence.present[t][0]) for t in evidence.predicates[name].types]
-        grid = np.stack(np.meshgrid(*ids, indexing="ij"), axis=-1).reshape(-1, len(ids)).astype(np.int32)
-        found.append(evidence.atom_number(name, grid))
-    return np.sort(np.concatenate(found))
+    found = [evidence.atom_number(name, every_atom(evidence, evidence.predicates[name])) for name in targets]
+    return np.sort(np.concatenate([np.empty(0, np.int64), *found]))
 
 
 def with_facts(databases: Evidence, targets: frozenset[str], true: list[Int64]) -> Evidence:
@@ -144,6 +140,6 @@ def with_facts(databases: Evidence, targets: frozenset[str], true: list[Int64]) 
         order = np.lexsort((atoms[here], database[here]))
         within = (atoms[here] - first[name])[order]
         columns = np.unravel_index(within, sizes) if sizes else ()
-        arguments = np.array(columns, np.int32).reshape(len(sizes), -1).T
+        arguments = np.array(columns, np.int32).reshape(len(sizes), len(within)).T
         facts[name] = Facts(database[here][order], np.ascontiguousarray(arguments), np.ones(len(within), np.bool_))
     return replace(databases, facts=facts)

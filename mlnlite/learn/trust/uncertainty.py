@@ -213,11 +213,12 @@ def _bootstrap(learned: LearnedModel, databases: Evidence, level: float, repetit
             database_weights=how.database_weights,
         )
         draws.append(again.weights)
-    table = np.array(draws)
-    spread = np.cov(table.T, ddof=1).reshape(table.shape[1], table.shape[1])
+    table, finite = np.array(draws), np.isfinite(learned.weights)
+    spread = np.cov(np.where(finite, table, 0.0).T, ddof=1).reshape(table.shape[1], table.shape[1])
     covariance = sparse.csr_array(spread)
     sd = _sd(covariance, learned)
-    shift = np.quantile(table - learned.weights, [0.5 + level / 2, 0.5 - level / 2], axis=0)
+    away = np.subtract(table, learned.weights, out=np.zeros(table.shape), where=finite)
+    shift = np.quantile(away, [0.5 + level / 2, 0.5 - level / 2], axis=0)
     low, high = learned.weights - shift[0], learned.weights - shift[1]
     missing = np.isnan(sd)
     low, high = (np.where(missing, np.nan, end) for end in (low, high))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mlnlite.errors import LimitReached
-from mlnlite.learn.learned import How
+from mlnlite.learn.learned import How, targets_of
 from mlnlite.learn.objectives.choose import task_of
 from mlnlite.learn.optimise.problem import log_likelihood
 from mlnlite.learn.trust.clusters import ENOUGH, clustered
@@ -58,8 +58,7 @@ def _is_sampled(model: Model, databases: Evidence, how: How) -> bool:
     """Whether the likelihood is too wide to be worked out."""
     if how.objective != "likelihood":
         return False
-    targets = frozenset(model.predicates if how.predict is None else how.predict)
-    problem = task_of(model, databases, how, targets, None).problem
+    problem = task_of(model, databases, how, targets_of(model, how), None).problem
     try:
         log_likelihood(problem, np.zeros(len(problem.free)))
     except LimitReached:
