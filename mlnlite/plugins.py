@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING
 
 from mlnlite.errors import MlnError
 
 if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
     import click
 
 GROUP = "mlnlite.plugins"
@@ -32,6 +33,8 @@ class Plugin:
 
 def installed() -> dict[str, EntryPoint]:
     """The entry points of all installed plugins, by name, not yet loaded."""
+    from importlib.metadata import entry_points  # late: most commands do without
+
     return {entry.name: entry for entry in entry_points(group=GROUP)}
 
 

@@ -10,13 +10,16 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.metadata import EntryPoint
 from types import FrameType
+from typing import TYPE_CHECKING
 
 import click
 
 from mlnlite import __version__
 from mlnlite.errors import LimitReached, MlnError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 COMMANDS = {
     "check": "Say what a model and its evidence are, and what is wrong with them.",

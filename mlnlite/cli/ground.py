@@ -82,7 +82,6 @@ def ground(**options: Unpack[_Options]) -> None:
     """
     import mlnlite as ml
     from mlnlite.engines.choose import engine_named
-    from mlnlite.ground.export.write import export
     from mlnlite.ground.forecast import Limits
     from mlnlite.ground.ground import forecasts
 
@@ -99,8 +98,11 @@ def ground(**options: Unpack[_Options]) -> None:
     with working("grounding"):
         limits = Limits(options["max_groundings"], options["max_memory"])
         network = ml.ground(model, evidence, engine=engine, limits=limits)
-    for path in options["export"]:
-        export(network, path)
+    if options["export"]:
+        from mlnlite.ground.export.write import export  # late: most calls do without
+
+        for path in options["export"]:
+            export(network, path)
     emit(_json(network) if options["format"] == "json" else _text(network), options["output"])
 
 
