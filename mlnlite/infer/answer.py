@@ -83,7 +83,7 @@ def marginal(  # noqa: PLR0913
     """
     approach = Approach(method, width_limit, precision, time_limit, chains, seed)
     if method in ("auto", "lifted") and query is not None:
-        known = evidence if closed_world == "all" else _closed(evidence, closed_world, frozenset())
+        known = evidence if closed_world == "all" else _closed(evidence, closed_world)
         lifted = lifted_marginals(model, known, query, others_closed=closed_world == "all", must=method == "lifted")
         if lifted is not None:
             return lifted
@@ -271,8 +271,12 @@ def ask(
 ) -> Asked:
     """Grounds what a question is about; see `marginal`. `waits`: formulas of very many groundings may wait."""
     start = perf_counter()
-    question = None if query is None else question_of(query, model, evidence)
-    evidence = _closed(evidence, closed_world, frozenset() if question is None else question.predicates)
+    if closed_world != "all":
+        evidence = _closed(evidence, closed_world)
+    question = None if query is None else question_of(query, model, evidence, lasting=False)
+    if closed_world == "all":
+        asked = frozenset() if question is None else question.predicates
+        evidence = closed(evidence, [n for n, p in evidence.predicates.items() if n not in asked and p.marker != "!"])
     atoms, lazy = None if question is None else question.all_atoms, None
     if waits:
         from mlnlite.infer.map.cuts.waiting import without_lazy, worth_waiting
@@ -284,9 +288,7 @@ def ask(
     return Asked(question, network, perf_counter() - start, lazy)
 
 
-def _closed(evidence: Evidence, closed_world: str | Iterable[str], asked: frozenset[str]) -> Evidence:
-    if closed_world == "all":
-        return closed(evidence, [n for n, p in evidence.predicates.items() if n not in asked and p.marker != "!"])
+def _closed(evidence: Evidence, closed_world: str | Iterable[str]) -> Evidence:
     names = [closed_world] if isinstance(closed_world, str) else list(closed_world)
     for name in names:
         predicate = evidence.predicates.get(name)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from math import prod
 from typing import assert_never
@@ -13,9 +14,23 @@ from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
 from mlnlite.model.evidence import Evidence
-from mlnlite.model.formulas import All, Any, AtomRef, Const, Count, Equal, Exists, Expression, Formula, Iff, Not, Var
+from mlnlite.model.formulas import (
+    All,
+    Any,
+    AtomRef,
+    AtomSchema,
+    Const,
+    Count,
+    Equal,
+    Exists,
+    Expression,
+    Formula,
+    Iff,
+    Not,
+    Var,
+)
 from mlnlite.model.model import Model
-from mlnlite.model.propositional import FALSE, TRUE, without_quantifiers
+from mlnlite.model.propositional import FALSE, TRUE, Binding, without_quantifiers
 from mlnlite.model.symbols import Predicate
 from mlnlite.model.typing import Constants, FormulaTyper, atoms_of
 from mlnlite.syntax import tree
@@ -25,8 +40,8 @@ from mlnlite.syntax.write import write_formula
 
 Int64 = NDArray[np.int64]
 
-MOST_ROWS = 2_000_000
-"""Answers that one question may have."""
+MOST_ROWS, MOST_CASES = 2_000_000, 10_000_000
+"""Answers that one question may have, and how many cases of quantifiers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +74,7 @@ class Question:
         return every[np.diff(every, prepend=-1) > 0]
 
 
-def question_of(query: str | Sequence[str], model: Model, evidence: Evidence) -> Question:
+def question_of(query: str | Sequence[str], model: Model, evidence: Evidence, *, lasting: bool = True) -> Question:
     """The question that texts mean.
 
     Args:
@@ -67,6 +82,7 @@ def question_of(query: str | Sequence[str], model: Model, evidence: Evidence) ->
             commas or in a sequence.
         model: the vocabulary.
         evidence: the constants.
+        lasting: the question will be asked of other facts, too; otherwise the given ones are put into quantifiers.
 
     Raises:
         SyntaxMistake: if a text is no formula.
@@ -77,6 +93,7 @@ def question_of(query: str | Sequence[str], model: Model, evidence: Evidence) ->
     formulas: list[GroundFormula] = []
     names: set[str] = set()
     mistakes: list[Diagnostic] = []
+    decide = _undecided if lasting else _fact_reader(evidence)
     for text in (item for part in texts for item in split_queries(part)):
         formula = parse_atom_query(text, model.dialect)
         names |= {a.predicate for a in atoms_of(formula)}
@@ -87,8 +104,8 @@ def question_of(query: str | Sequence[str], model: Model, evidence: Evidence) ->
         typed = _typed(formula, model, evidence, mistakes)
         if typed is None:
             continue
-        for binding, ground in _groundings(typed, evidence):
-            if isinstance(ground, AtomRef):
+        for binding, ground in _groundings(typed, evidence, decide):
+            if isinstance(typed.body, AtomRef) and isinstance(ground, AtomRef):
                 atoms.append(np.array([ground.index], np.int64))
             else:
                 formulas.append(GroundFormula(_text(formula, binding, model), ground))
@@ -135,21 +152,48 @@ def _some(constants: list[str]) -> str:
     return f"there are {shown}" if constants else "the type has no constants: give evidence"
 
 
-def _groundings(formula: Formula, evidence: Evidence) -> Iterator[tuple[dict[str, str], Expression]]:
+def _undecided(schema: AtomSchema) -> bool | None:
+    return None
+
+
+def _fact_reader(evidence: Evidence) -> Callable[[AtomSchema], bool | None]:
+    """What facts and closed worlds say of ground atoms."""
+
+    @cache
+    def facts(name: str) -> dict[tuple[int, ...], bool]:
+        found = evidence.facts[name]
+        return dict(zip(map(tuple, found.arguments.tolist()), found.truth.tolist(), strict=True))
+
+    def decide(schema: AtomSchema) -> bool | None:
+        if any(isinstance(term, Var) for term in schema.arguments):
+            return None
+        key = tuple(term.id for term in schema.arguments if isinstance(term, Const))
+        return facts(schema.predicate).get(key, False if evidence.predicates[schema.predicate].closed else None)
+
+    return decide
+
+
+def _groundings(
+    formula: Formula, evidence: Evidence, decide: Callable[[AtomSchema], bool | None]
+) -> Iterator[tuple[dict[str, str], Expression]]:
     """Each binding of the free variables (as text) with the expression over atom numbers."""
     present = {name: np.flatnonzero(p[0]).tolist() for name, p in evidence.present.items()}
-    plain = without_quantifiers(formula, present)
-    free = formula.free
-    ranges = [present[formula.variables[v].type] for v in free]
-    n = prod([len(r) for r in ranges])
+    free, ranges = formula.free, [present[v.type] for v in formula.variables]
+    n, n_cases = prod([len(ranges[v]) for v in free]), prod(map(len, ranges))
     if n > MOST_ROWS:
         raise QueryMistake(f"the formula has {n:,} groundings; at most {MOST_ROWS:,} can be asked for at once")
-    for values in product(*ranges):
+    if n_cases > MOST_CASES:
+        message = (
+            f"the quantifiers of the formula range over {n_cases:,} cases; at most {MOST_CASES:,} can be asked for"
+        )
+        raise QueryMistake(message, hint="put constants in place of variables, or make the formula a part of the model")
+    for values in product(*(ranges[v] for v in free)):
         binding = dict(zip(free, values, strict=True))
         texts = {
             formula.variables[v].name: evidence.types[formula.variables[v].type].constants[c]
             for v, c in binding.items()
         }
+        plain = without_quantifiers(formula, present, decide, Binding({v: Const(c) for v, c in binding.items()}))
         yield texts, _ground(plain, plain.body, binding, evidence)
 
 

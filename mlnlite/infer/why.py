@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from mlnlite.infer.map.rungs import Method
 from mlnlite.infer.query import question_of
 from mlnlite.infer.score import counts, log_weight, n_paid
 from mlnlite.model.change import UNKNOWN
+from mlnlite.model.formulas import Formula
+from mlnlite.model.model import Model
 from mlnlite.model.propositional import cubes
 from mlnlite.model.unparse import row_text
 from mlnlite.results.why import Alternative, PaidGrounding
@@ -52,38 +55,49 @@ def paid_groundings(
         engine: what runs the queries.
     """
     world = world_evidence(network, truth)
-    tables = {**tables_of(world), **row_tables(network.model)}
-    run = (engine or engine_for()).load(tables)
+    paid = np.array(sorted(texts), np.int64)
     found: list[PaidGrounding] = []
-    for t in sorted({int(network.template[w]) for w in texts}):
-        source = source_of(t, network.model.templates[t], world)
-        if source.counted:
-            continue
-        first = int(np.searchsorted(network.template, t))
-        for value in (False, True):
-            for cube in cubes(source.formula.body, value):
+    for violated in (True, False):
+        weights = paid[(network.weights[paid] > 0) == violated]
+        model = _with_weights(network, weights)
+        run = (engine or engine_for()).load({**tables_of(world), **row_tables(model)})
+        for t in np.unique(network.template[weights]).tolist():
+            source = source_of(t, model.templates[t], world)
+            own = weights[network.template[weights] == t]
+            for cube in () if source.counted else cubes(source.formula.body, not violated):
                 rows = run(bindings(source, cube, source.formula.free))
                 free = {v: rows[column(v)] for v in source.formula.free}
                 n = len(next(iter(rows.values()), np.zeros(1)))
-                row = rows["row"] if source.tabled else np.zeros(n, np.int64)
-                found += _paid(network, t, (first + row, free), texts, violated=not value)
+                which = own[rows["row"] if source.tabled else np.zeros(n, np.int64)]
+                found += _paid(network, source.formula, (which, free), texts)
     return sorted(found, key=lambda g: (-g.cost, g.formula, g.binding))
 
 
+def _with_weights(network: Network, weights: Int64) -> Model:
+    """The model with some of its formulas only; templates keep their places."""
+    chosen = np.zeros(len(network.weights), np.bool_)
+    chosen[weights] = True
+    own = np.split(chosen, np.searchsorted(network.template, np.arange(1, len(network.model.templates))))
+    return replace(
+        network.model,
+        templates=tuple(
+            replace(t, rows=None if t.rows is None else t.rows[o], weights=t.weights[o], row_spans=())
+            for t, o in zip(network.model.templates, own, strict=True)
+        ),
+    )
+
+
 def _paid(
-    network: Network, template: int, rows: tuple[Int64, dict[int, Int64]], texts: dict[int, str], *, violated: bool
+    network: Network, formula: Formula, groundings: tuple[Int64, dict[int, Int64]], texts: dict[int, str]
 ) -> Iterator[PaidGrounding]:
-    """Groundings that are false, if the weight is positive, or true, if it is negative."""
-    weights, free = rows
-    formula = network.model.templates[template].formula
-    for i in np.flatnonzero((network.weights[weights] > 0) == violated).tolist():
-        w = int(weights[i])
-        if w in texts:
-            binding = tuple(
-                (formula.variables[v].name, network.evidence.types[formula.variables[v].type].constants[int(ids[i])])
-                for v, ids in free.items()
-            )
-            yield PaidGrounding(texts[w], binding, float(network.weights[w]))
+    """Groundings, each by its weight and the constants of its variables, as records."""
+    weights, free = groundings
+    for i, w in enumerate(weights.tolist()):
+        binding = tuple(
+            (formula.variables[v].name, network.evidence.types[formula.variables[v].type].constants[int(ids[i])])
+            for v, ids in free.items()
+        )
+        yield PaidGrounding(texts[w], binding, float(network.weights[w]))
 
 
 def alternative(network: Network, truth: Bool, text: str, method: Method, time_limit: float | None) -> Alternative:

@@ -57,7 +57,10 @@ def _open(schema: AtomSchema) -> bool | None:
 
 
 def without_quantifiers(
-    formula: Formula, constants: Mapping[str, Iterable[int]], decide: Callable[[AtomSchema], bool | None] = _open
+    formula: Formula,
+    constants: Mapping[str, Iterable[int]],
+    decide: Callable[[AtomSchema], bool | None] = _open,
+    binding: Binding = Binding({}),
 ) -> Formula:
     """The formula with each `EXIST` written out as a disjunction over the constants of its type.
 
@@ -65,6 +68,7 @@ def without_quantifiers(
         formula: the formula.
         constants: of each type.
         decide: the truth of an atom, or None if it is to stay an atom.
+        binding: terms for free variables.
 
     Raises:
         LimitReached: if that gives more atoms than is sensible.
@@ -73,7 +77,7 @@ def without_quantifiers(
         return formula
     atoms: dict[AtomSchema, int] = {}
     writing = _Writing(formula, {k: tuple(v) for k, v in constants.items()}, decide, atoms)
-    body = _written_out(writing, formula.body, Binding({}))
+    body = _written_out(writing, formula.body, binding)
     return replace(formula, atoms=tuple(atoms), body=simplified(body, {}))
 
 
@@ -138,15 +142,27 @@ def _written_out(writing: _Writing, expression: Expression, binding: Binding) ->
         case Not(operand):
             return Not(inside(operand))
         case All(operands):
-            return All(tuple(map(inside, operands)))
+            return FALSE if _has(writing, operands, binding, False) else All(tuple(map(inside, operands)))
         case Any(operands):
-            return Any(tuple(map(inside, operands)))
+            return TRUE if _has(writing, operands, binding, True) else Any(tuple(map(inside, operands)))
         case Iff(left_side, right_side):
             return Iff(inside(left_side), inside(right_side))
         case Exists() | Count():
             return _quantified(writing, expression, binding)
         case _:
             raise AssertionError(expression)
+
+
+def _has(writing: _Writing, operands: Sequence[Expression], binding: Binding, truth: bool) -> bool:
+    """Whether one of some expressions is a literal that is known to have a truth value."""
+    for operand in operands:
+        atom, value = (operand.operand, not truth) if isinstance(operand, Not) else (operand, truth)
+        if isinstance(atom, AtomRef):
+            schema = writing.formula.atoms[atom.index]
+            bound = AtomSchema(schema.predicate, tuple(map(binding.term, schema.arguments)))
+            if writing.decide(bound) is value:
+                return True
+    return False
 
 
 def _quantified(writing: _Writing, expression: Exists | Count, binding: Binding) -> Expression:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import mlnlite as ml
 from mlnlite.errors import Contradiction, LimitReached
 from mlnlite.infer.exact.formula import formula_probabilities, formula_probability
 from mlnlite.model.formulas import All, Any, AtomRef, Iff, Not
@@ -65,3 +66,25 @@ def test_formulas_that_are_only_wide_together_are_answered_in_groups():
     np.testing.assert_allclose(answer, p * p + (1 - p) * (1 - p), atol=1e-12)
     with pytest.raises(LimitReached, match="atoms"):
         formula_probability(net, All(tuple(pairs)), width_limit=4)
+
+
+def test_facts_are_put_into_quantifiers_first():
+    n = 25_000
+    model = ml.model_from_text("*Friends(p, p)\nSmokes(p)\n0.5 Smokes(x)\n")
+    facts = "".join(f"Friends(P{i}, P{i + 1})\nFriends(P{i}, P{(i + 7) % n})\n" for i in range(n)) + "!Smokes(P8)\n"
+    evidence = ml.evidence_from_text(facts, model=model)
+    some, every, sure = (
+        "EXIST x (Smokes(x) ^ Friends(P1, x))",
+        "FORALL x (Friends(P3, x) => Smokes(x))",
+        "EXIST x Friends(P1, x)",
+    )
+    answer = ml.marginal(model, evidence, [some, every, sure])
+    one = 1 / (1 + np.exp(-0.5))
+    assert answer.probabilities == pytest.approx([one, one**2, 1.0])
+
+
+def test_a_session_keeps_quantifiers_open_for_facts_to_come():
+    model = ml.model_from_text("*Friends(p, p)\nSmokes(p)\np = {Ann, Bob, Cid}\n0.5 Smokes(x)\n")
+    session = ml.compile(model, query="EXIST x (Smokes(x) ^ Friends(Ann, x))")
+    assert session.query().probabilities == pytest.approx([0.0])
+    assert session.updated(add="Friends(Ann, Bob)").query().probabilities == pytest.approx([1 / (1 + np.exp(-0.5))])

@@ -124,3 +124,11 @@ def test_rows_of_constants_that_only_the_evidence_has_are_named():
     evidence = ml.evidence_from_text("Likes(Ann, Red)\n!Likes(Bob, Blue)\n", model=model)
     state = ml.map_state(model, evidence)
     assert [(v.formula, v.n_groundings) for v in state.violated] == [("Likes(x, Red)", 1), ("Likes(x, Blue)", 1)]
+
+
+def test_satisfied_groundings_are_not_listed():
+    n = 30_000  # 900 million groundings, nearly all of them satisfied
+    model = ml.model_from_text("*Friends(p, p)\nSmokes(p)\n1 Friends(x, y) ^ Smokes(x) => Smokes(y)\n0.1 !Smokes(x)\n")
+    facts = "".join(f"Friends(P{i}, P{i + 1})\n" for i in range(n)) + "Smokes(P0)\n!Smokes(P2)\n"
+    state = ml.map_state(model, ml.evidence_from_text(facts, model=model), why=True)
+    assert {g.binding for g in state.paid} == {(("x", "P0"), ("y", "P1"))}

@@ -41,7 +41,7 @@ def lifted_marginals(
         if must:
             raise QueryMistake(f"no lifted inference for this model: {fragment}")
         return None
-    question = question_of(query, model, evidence) if must or _is_large(fragment, evidence) else None
+    question = question_of(query, model, evidence, lasting=False) if must or _is_large(fragment, evidence) else None
     if question is None or not _fits(question, fragment):
         if must:
             raise QueryMistake("lifted inference answers atoms of predicates that formulas mention, nothing else")

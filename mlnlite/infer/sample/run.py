@@ -27,7 +27,7 @@ Ending = Literal["precise", "time", "interrupted"]
 
 LEAST_SIZE = 400.0
 MOST_R_HAT = 1.01
-_FIRST_LOOK, _LATER = 256, 1.5
+FIRST_LOOK, _LATER = 256, 1.5
 _AT_ONCE, _FEWEST, _WORST, _STRIDE = 0.2, 8, 64, 8
 T = TypeVar("T")
 
@@ -225,7 +225,7 @@ def until_precise(run: Run, precision: float, deadline: Deadline) -> tuple[Look,
         precision: largest standard error.
         deadline: when to stop anyway.
     """
-    n, due, was_enough = 1, _FIRST_LOOK, False
+    n, due, was_enough = 1, FIRST_LOOK, False
     while run.traces.n < _FEWEST or not deadline.is_over:
         begin = perf_counter()
         make_room(run.traces)

@@ -13,7 +13,17 @@ from mlnlite.infer.approach import PATIENCE, Sampler
 from mlnlite.infer.deadline import Deadline, in_seconds, interruptible
 from mlnlite.infer.sample.diagnostics import jeffreys
 from mlnlite.infer.sample.factors import Factors, factors_of
-from mlnlite.infer.sample.run import LEAST_SIZE, MOST_R_HAT, Ending, Look, Run, new_run, until_precise, warm_up
+from mlnlite.infer.sample.run import (
+    FIRST_LOOK,
+    LEAST_SIZE,
+    MOST_R_HAT,
+    Ending,
+    Look,
+    Run,
+    new_run,
+    until_precise,
+    warm_up,
+)
 from mlnlite.infer.sample.worlds import can_differ, start_worlds
 from mlnlite.model.formulas import Expression
 
@@ -103,7 +113,8 @@ def sample(
     with interruptible(deadline):
         whole = deadline if sampler else deadline.within(deadline.left / 2)
         run, found, ending = _run(network, factors, asked, chosen, effort, whole)
-        if sampler is None and ending == "time" and _worst(found) <= DISAGREE:
+        says_little = run.traces.n_draws < FIRST_LOOK
+        if sampler is None and ending == "time" and (says_little or _worst(found) <= DISAGREE):
             found, ending = until_precise(run, effort.precision, deadline)
         elif sampler is None and ending == "time":
             second: Sampler = "mcsat" if chosen == "gibbs" else "tempering"
