@@ -54,7 +54,7 @@ class TableFacts:
 
     Attributes:
         facts: what its rows say about a predicate; what is certain and what is not stand apart.
-        constants: for each argument those of all rows, rows that say nothing included.
+        constants: for each argument those of the rows that say nothing.
         cuts: for each argument its cut points, if it was divided into bins.
     """
 
@@ -229,7 +229,7 @@ def _read_table(table: FactTable, first: int, reading: _Reading) -> None:
 
 
 def _mention(program: TableFacts, first: int, reading: _Reading) -> None:
-    """Notes the constants of all rows of a table, those that say nothing included, and cut points."""
+    """Notes the constants of the rows of a table that say nothing, and cut points."""
     predicate = reading.predicates[program.facts[0].predicate]
     for type_name, names in zip(predicate.types, program.constants, strict=True):
         reading.declared.append((first, first + 1, type_name, reading.types[type_name].ids(names)))

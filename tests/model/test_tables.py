@@ -11,8 +11,11 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import mlnlite as ml
+from mlnlite.model import tabular
 
 MODEL = "Friends(person, person)\nAge(person, years!)\nSmokes(person)\n1 Friends(x, y) => Smokes(x)"
 ROWS = [("Anna", "Bob"), ("Bob", "Cid"), ("Anna", 'O\'Neill, "Cy"')]
@@ -192,3 +195,22 @@ def test_bad_mapping(model, tmp_path, text):
     with pytest.raises(ml.EvidenceMistake) as caught:
         ml.read_evidence(tmp_path / "m.toml", model=model)
     assert {d.code for d in caught.value.diagnostics} <= {"E330", "E331"}
+
+
+@given(st.sets(st.one_of(st.integers(0, 2**64 - 1), st.integers(2**64 - 9, 2**64 - 1), st.integers(0, 9)), min_size=1))
+def test_places_of_hashes(hashes):
+    rising = np.array(sorted(hashes), np.uint64)
+    assert tabular._places(rising[::-1], rising).tolist() == list(range(len(rising)))[::-1]
+
+
+def test_columns_of_one_type_share_constants_and_lack_some():
+    model = ml.model_from_text("F(p, q, p)")
+    data = {"a": ["X", None, "Z"], "b": ["X", "Y", "X"], "c": ["Y", "W", "X"]}
+    evidence = ml.Evidence.from_tables({"F": data}, model=model)
+    rows = [
+        [evidence.types[t].constants[i] for t, i in zip("pqp", row, strict=True)]
+        for row in evidence.facts["F"].arguments
+    ]
+    assert sorted(rows) == [["X", "X", "Y"], ["Z", "X", "X"]]
+    assert set(evidence.types["p"].constants) == {"X", "Y", "Z", "W"}
+    assert set(evidence.types["q"].constants) == {"X", "Y"}
