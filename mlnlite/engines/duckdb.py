@@ -68,7 +68,7 @@ class DuckDBEngine:
 
     @contextmanager
     def _bounded(self, what: str) -> Iterator[None]:
-        """Says what needed too much memory, and that the user interrupted it, in words that others know."""
+        """Says what needed too much memory or room on disk, and that the user interrupted it, in words that others know."""
         import duckdb
 
         try:
@@ -76,6 +76,8 @@ class DuckDBEngine:
         except duckdb.OutOfMemoryException as error:
             limit = "there is" if self.memory is None else f"the limit of {self.memory:,} bytes"
             raise LimitReached(f"{what} needs more memory than {limit}") from error
+        except duckdb.IOException as error:
+            raise LimitReached(f"{what} needs more room for temporary files than there is: {error}") from error
         except (duckdb.InterruptException, RuntimeError) as error:
             if "interrupted" in str(error).lower():
                 raise KeyboardInterrupt from error

@@ -138,6 +138,20 @@ def test_memory_of_a_database_is_bounded():
         run(Count(Join(R, Scan("r", ("z", "y"))), ("x", "z")))
 
 
+def test_a_database_that_cannot_write_what_it_spills_says_so(tmp_path):
+    run = DuckDBEngine(memory=60 * 10**6, scratch=str(tmp_path)).load({"r": (np.arange(100), np.arange(100))})
+    (folder,) = tmp_path.iterdir()
+    for file in folder.iterdir():
+        file.unlink()
+    folder.rmdir()
+    folder.write_text("no folder any more")
+    product = Join(Join(Scan("r", ("x", "a")), Scan("r", ("y", "b"))), Scan("r", ("z", "c")))
+    with pytest.raises(ml.LimitReached, match="temporary files"):
+        run(Count(product, ("x", "y", "z")))
+    folder.unlink()
+    folder.mkdir()
+
+
 CHAIN = """*Start(a)
 *E0(a, a)
 *E1(a, a)
