@@ -68,7 +68,7 @@ class DuckDBEngine:
 
     @contextmanager
     def _bounded(self, what: str) -> Iterator[None]:
-        """Says what needed too much memory or room on disk, and that the user interrupted it, in words that others know."""
+        """Says what needed too much memory or disk, and that the user interrupted it, in words that others know."""
         import duckdb
 
         try:

@@ -139,7 +139,7 @@ def test_memory_of_a_database_is_bounded():
 
 
 def test_a_database_that_cannot_write_what_it_spills_says_so(tmp_path):
-    run = DuckDBEngine(memory=60 * 10**6, scratch=str(tmp_path)).load({"r": (np.arange(100), np.arange(100))})
+    run = DuckDBEngine(memory=60 * 10**6, scratch=str(tmp_path)).load({"r": (np.arange(180), np.arange(180))})
     (folder,) = tmp_path.iterdir()
     for file in folder.iterdir():
         file.unlink()
