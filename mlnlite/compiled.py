@@ -9,12 +9,13 @@ from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from threading import Timer
 from time import monotonic
 from typing import Any
 
 _FIRST = "compiling fast code for the first time; this is kept for later"
-_EVERY = 2.0
-"""[s] between words about it."""
+_EVERY, _PATIENCE = 2.0, 1.5
+"""[s] between words about it, and before one about what takes long every time."""
 
 
 def prepare_cache() -> None:
@@ -34,10 +35,9 @@ def _writable(folder: Path) -> bool:
 
 def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401
     """A function that Numba compiles when it is first called and keeps in a cache; a user hears of it if it does."""
-    prepare_cache()
+    _load_compiler()
     from numba import njit
 
-    _announce_compiling()
     return njit(cache=True, nogil=True)(function)
 
 
@@ -46,7 +46,7 @@ def compiled_part(function: Callable[..., Any]) -> Any:  # noqa: ANN401
 
     It does not count references to the arrays it gets, which could take several times as long as what it does.
     """
-    prepare_cache()
+    _load_compiler()
     from numba import njit
 
     options: dict[str, Any] = {"_nrt": False}
@@ -54,21 +54,55 @@ def compiled_part(function: Callable[..., Any]) -> Any:  # noqa: ANN401
 
 
 @cache
+def _load_compiler() -> None:
+    """Loads Numba with all that it has to know before it compiles, and has it say so when it does."""
+    prepare_cache()
+    slow = _later(_PATIENCE, lambda: _say("loading the compiler"))
+    try:
+        registry: Any = import_module("numba.core.registry")
+        registry.cpu_target.target_context.refresh()
+    finally:
+        slow.cancel()
+    _announce_compiling()
+
+
+def _say(what: str) -> None:
+    """A word to the user, through the logger `mlnlite`, which by default writes to standard error."""
+    logging.getLogger("mlnlite").warning(what)
+
+
+def _later(seconds: float, what: Callable[[], None]) -> Timer:
+    """Has something done in so many seconds, unless it is cancelled or the program ends before."""
+    timer = Timer(seconds, what)
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
 def _announce_compiling() -> None:
-    """Says what takes so long, through the logger `mlnlite`, which by default writes to standard error."""
+    """Has what takes so long said: when Numba begins to compile something that its cache does not hold, and while."""
     numba_events: Any = import_module("numba.core.event")
+    depth, due, reminders = [0], [0.0], list[Timer]()
+
+    def remind() -> None:
+        if monotonic() >= due[0]:
+            _say("compiling more of it" if due[0] else _FIRST)
+            due[0] = monotonic() + _EVERY
+        reminders[:] = [_later(_EVERY, remind)]
 
     class Announcer(numba_events.Listener):  # type: ignore[misc]
-        """Hears when Numba begins to compile something that its cache does not hold."""
+        """Hears of functions and of those that they call, which are compiled meanwhile."""
 
         def on_start(self, event: object) -> None:
             """Says so, the first time, and then every two seconds."""
-            if monotonic() >= due[0]:
-                logging.getLogger("mlnlite").warning("compiling more of it" if due[0] else _FIRST)
-                due[0] = monotonic() + _EVERY
+            depth[0] += 1
+            if depth[0] == 1:
+                remind()
 
         def on_end(self, event: object) -> None:
-            """Nothing to say."""
+            """Is silent once the outermost is done."""
+            depth[0] -= 1
+            if depth[0] == 0:
+                reminders[0].cancel()
 
-    due = [0.0]
     numba_events.register("numba:compile", Announcer())

@@ -21,6 +21,8 @@ def marginals():
         np.array([True, True, True, True, False]),
         np.array([0, 0, 0, 0, 0.004]),
         log_z=1.5,
+        low=np.array([0.25, 0.75, 1.0, 0.25, 0.117]),
+        high=np.array([0.25, 0.75, 1.0, 0.25, 0.133]),
         statistics=Statistics(1234, 5, 2, 8, {"ground": 0.25}),
         block=np.array([-1, 0, -1, 0, -1]),
     )
@@ -66,7 +68,7 @@ def test_marginals_travel():
     data = json.loads(marginals().to_json())
     assert data["log_z"] == 1.5
     assert data["marginals"][4] == {
-        "name": NAMES[4], "probability": 0.125, "method": "gibbs", "exact": False, "error": 0.004,
+        "name": NAMES[4], "probability": 0.125, "method": "gibbs", "exact": False, "error": 0.004, "low": 0.117, "high": 0.133,
     }  # fmt: skip
     assert data["statistics"]["seconds"] == {"ground": 0.25}
     empty = Marginals((), np.zeros(0), (), np.zeros(0, bool), np.zeros(0))
@@ -103,7 +105,7 @@ def test_states_are_mappings_and_travel():
 def test_frames_need_pandas(monkeypatch):
     pytest.importorskip("pandas")
     frame = marginals().to_frame()
-    assert frame.columns.tolist() == ["name", "probability", "method", "exact", "error"]
+    assert frame.columns.tolist() == ["name", "probability", "method", "exact", "error", "low", "high"]
     assert frame["probability"].tolist() == [0.25, 0.75, 1.0, 0.25, 0.125]
     assert state().to_frame()["truth"].tolist() == [False, True, True, False]
     monkeypatch.setitem(sys.modules, "pandas", None)

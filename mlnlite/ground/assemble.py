@@ -155,18 +155,21 @@ def _with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
         low, high = atom_range(predicate, evidence)
         mine = (atoms >= low) & (atoms < high)
         stride = strides(evidence, predicate.name)[predicate.value]
-        size = evidence.sizes(predicate.name)[predicate.value]
-        first = np.unique(_first_of_block(atoms[mine], low, stride, size))
+        first = np.unique(first_of_block(atoms[mine], predicate, evidence))
         values = np.flatnonzero(evidence.present[predicate.types[predicate.value]][0])
         members = (first[:, None] + values[None, :] * stride).ravel()
         members = members[~find(known_atoms(predicate, evidence), members)[1]]
         atoms = np.concatenate([atoms[~mine], members])
-        blocks = np.concatenate([blocks[~mine], _first_of_block(members, low, stride, size)])
+        blocks = np.concatenate([blocks[~mine], first_of_block(members, predicate, evidence)])
     order = np.argsort(atoms)
     return atoms[order], blocks[order]
 
 
-def _first_of_block(atoms: Int64, low: int, stride: int, size: int) -> Int64:
+def first_of_block(atoms: Int64, predicate: Predicate, evidence: Evidence) -> Int64:
+    """Numbers of the first atoms (known or not) of the blocks of some atoms of a functional predicate."""
+    assert predicate.value is not None
+    low, _ = atom_range(predicate, evidence)
+    stride, size = strides(evidence, predicate.name)[predicate.value], evidence.sizes(predicate.name)[predicate.value]
     value = (atoms - low) // stride % size
     return np.asarray(atoms - value * stride, np.int64)
 

@@ -11,7 +11,7 @@ from mlnlite.errors import QueryMistake
 from mlnlite.ground.forecast import Limits
 from mlnlite.ground.ground import NO_LIMITS
 from mlnlite.ground.network import Network
-from mlnlite.infer.answer import ask, state_of
+from mlnlite.infer.answer import ask, closed_and_asked, state_of
 from mlnlite.infer.map.kbest import World, best_worlds, diverse_worlds
 from mlnlite.infer.map.ladder import BestWorld
 from mlnlite.infer.map.rungs import verify
@@ -62,7 +62,8 @@ def map_states(  # noqa: PLR0913
     if diverse is not None and not 0 <= diverse < np.inf:
         raise QueryMistake(f"{diverse} is no log-weight to lose", "give a finite number of 0 or more")
     verify(time_limit=time_limit, seed=seed)
-    asked = ask(model, evidence, query, closed_world, engine, limits)
+    question, evidence = closed_and_asked(model, evidence, query, closed_world)
+    asked = ask(model, evidence, question, engine, limits)
     network, limit = asked.network, time_limit
     if diverse is None:
         worlds = best_worlds(network, k, time_limit=limit, seed=seed)

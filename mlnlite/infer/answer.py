@@ -17,11 +17,12 @@ from mlnlite.ground.ground import NO_LIMITS, ground
 from mlnlite.ground.groups import renamed
 from mlnlite.ground.network import Network
 from mlnlite.infer.approach import Approach, MarginalMethod
-from mlnlite.infer.exact.liftable import lifted_marginals
 from mlnlite.infer.exact.marginal import WIDTH_LIMIT
+from mlnlite.infer.lifting import Lifted, lifted_answers, with_lifted
 from mlnlite.infer.marginal.ladder import solve
 from mlnlite.infer.marginal.results import EVIDENCE, marginals_from
-from mlnlite.infer.query import Question, atom_numbers, question_of
+from mlnlite.infer.n_worlds import log_worlds, log_worlds_of
+from mlnlite.infer.query import Question, atom_numbers, locate, question_of
 from mlnlite.infer.score import cost, counts, n_paid
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
@@ -82,13 +83,27 @@ def marginal(  # noqa: PLR0913
             need more than the limit.
     """
     approach = Approach(method, width_limit, precision, time_limit, chains, seed)
-    if method in ("auto", "lifted") and query is not None:
-        known = evidence if closed_world == "all" else _closed(evidence, closed_world)
-        lifted = lifted_marginals(model, known, query, others_closed=closed_world == "all", must=method == "lifted")
-        if lifted is not None:
-            return lifted
-    asked = ask(model, evidence, query, closed_world, engine, limits)
+    start, must = perf_counter(), method == "lifted"
+    question, evidence = closed_and_asked(model, evidence, query, closed_world)
+    approach = replace(approach, method="exact") if must else approach
+    if question is not None and method in ("auto", "lifted"):
+        found = lifted_answers(model, evidence, question, must=must, width_limit=width_limit, limits=limits)
+        if found is not None:
+            return _with_rest(found, question, approach, (engine, limits), start)
+    asked = ask(model, evidence, question, engine, limits)
     return marginals_for(asked.network, asked.question, approach, asked.seconds)
+
+
+def _with_rest(
+    found: Lifted, question: Question, approach: Approach, how: tuple[Engine | None, Limits], start: float
+) -> Marginals:
+    """What classes of constants answer, and the answer of a network to all else."""
+    rest = replace(question, atoms=question.atoms[~found.rows])
+    network = ground(found.model, found.evidence, query=rest.all_atoms, engine=how[0], limits=how[1])
+    answer = marginals_for(network, rest, approach)
+    names = [*_texts(found.evidence, question.atoms), *(f.text for f in question.formulas)]
+    whole = with_lifted(found, answer, names)
+    return replace(whole, statistics=replace(whole.statistics, seconds={"infer": perf_counter() - start}))
 
 
 def marginals_for(
@@ -98,11 +113,12 @@ def marginals_for(
     ground_seconds: float = 0.0,
 ) -> Marginals:
     """Answers a question about a network; see `marginal`."""
-    index, truth = _locate(network, question.atoms)
+    index, truth = locate(network, question.atoms)
     start = perf_counter()
     places, row = np.unique(index[index >= 0], return_inverse=True)
     expressions = [_over_network(f.expression, network) for f in question.formulas]
     solution = solve(network, places, expressions, approach)
+    solution.log_z += log_worlds(network.evidence) - log_worlds_of(network)  # of all open atoms
     source = np.full(len(index) + len(expressions), -1, np.int64)
     source[: len(index)][index >= 0] = row.ravel()
     source[len(index) :] = len(places) + np.arange(len(expressions))
@@ -159,7 +175,8 @@ def map_state(  # noqa: PLR0913
     from mlnlite.infer.map.rungs import verify
 
     verify(method=method, time_limit=time_limit, seed=seed, gap=gap)
-    asked = ask(model, evidence, query, closed_world, engine, limits, waits=True)
+    question, evidence = closed_and_asked(model, evidence, query, closed_world)
+    asked = ask(model, evidence, question, engine, limits, waits=True)
     return map_state_for(
         asked.network, asked.question, method=method, time_limit=time_limit, seed=seed, gap=gap, margins=margins,
         why=why, explain=explain, lazy=asked.lazy, ground_seconds=asked.seconds,
@@ -199,7 +216,7 @@ def map_state_for(  # noqa: PLR0913
     seconds = {"ground": ground_seconds, "infer": perf_counter() - start}
     state = state_of(network, question, best, seconds)
     if margins:
-        index, _ = _locate(network, question.atoms)
+        index, _ = locate(network, question.atoms)
         state = replace(state, margins=_margins(network, best.truth, index, time_limit))
     if why or explain is not None:
         from mlnlite.infer.why import alternative, paid_groundings, paid_texts
@@ -213,7 +230,7 @@ def map_state_for(  # noqa: PLR0913
 
 def state_of(network: Network, question: Question, best: BestWorld, seconds: Mapping[str, float]) -> MapState:
     """A world as an answer to a question."""
-    index, truth = _locate(network, question.atoms)
+    index, truth = locate(network, question.atoms)
     truth[index >= 0] = best.truth[index[index >= 0]]
     methods = [best.component_method[best.component[i]] if i >= 0 else EVIDENCE for i in index.tolist()]
     true = counts(network, best.truth)
@@ -259,24 +276,30 @@ class Asked:
     lazy: Lazy | None = None
 
 
-def ask(
-    model: Model,
-    evidence: Evidence,
-    query: str | Sequence[str] | None,
-    closed_world: str | Iterable[str],
-    engine: Engine | None,
-    limits: Limits = NO_LIMITS,
-    *,
-    waits: bool = False,
-) -> Asked:
-    """Grounds what a question is about; see `marginal`. `waits`: formulas of very many groundings may wait."""
-    start = perf_counter()
+def closed_and_asked(
+    model: Model, evidence: Evidence, query: str | Sequence[str] | None, closed_world: str | Iterable[str]
+) -> tuple[Question | None, Evidence]:
+    """The question that texts mean, None for all open atoms, and the evidence with closed worlds; see `marginal`."""
     if closed_world != "all":
         evidence = _closed(evidence, closed_world)
     question = None if query is None else question_of(query, model, evidence, lasting=False)
     if closed_world == "all":
         asked = frozenset() if question is None else question.predicates
         evidence = closed(evidence, [n for n, p in evidence.predicates.items() if n not in asked and p.marker != "!"])
+    return question, evidence
+
+
+def ask(
+    model: Model,
+    evidence: Evidence,
+    question: Question | None,
+    engine: Engine | None,
+    limits: Limits = NO_LIMITS,
+    *,
+    waits: bool = False,
+) -> Asked:
+    """Grounds what a question is about. `waits`: formulas of very many groundings may wait."""
+    start = perf_counter()
     atoms, lazy = None if question is None else question.all_atoms, None
     if waits:
         from mlnlite.infer.map.cuts.waiting import without_lazy, worth_waiting
@@ -298,16 +321,6 @@ def _closed(evidence: Evidence, closed_world: str | Iterable[str]) -> Evidence:
     return closed(evidence, names) if names else evidence
 
 
-def _locate(network: Network, numbers: Int64) -> tuple[Int64, NDArray[np.bool_]]:
-    """Index of each atom in the network, -1 for known ones; and their truth."""
-    index = np.searchsorted(network.atoms, numbers)
-    inside = np.minimum(index, max(network.n_atoms - 1, 0))
-    unknown = network.atoms[inside] == numbers if network.n_atoms else np.zeros(len(numbers), bool)
-    truth = np.zeros(len(numbers), bool)
-    truth[~unknown] = network.evidence.is_true(numbers[~unknown])
-    return np.where(unknown, index, -1), truth
-
-
 def _texts(evidence: Evidence, numbers: Int64) -> list[str]:
     order = np.argsort(numbers, kind="stable")
     texts = np.empty(len(numbers), object)
@@ -327,7 +340,7 @@ def _blocks(network: Network, index: Int64, n_rows: int) -> Int64:
 def _over_network(expression: Expression, network: Network) -> Expression:
     """An expression over atom numbers as one over the atoms of the network, known ones put in."""
     numbers = np.array(sorted(set(atom_numbers(expression))), np.int64)
-    index, truth = _locate(network, numbers)
+    index, truth = locate(network, numbers)
     known: dict[Proposition, bool] = {
         AtomRef(n): t for n, t, i in zip(numbers.tolist(), truth.tolist(), index.tolist(), strict=True) if i < 0
     }

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
+from mlnlite.ground.network import Network
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import (
     All,
@@ -247,3 +248,13 @@ def atom_numbers(expression: Expression) -> Iterable[int]:
             return [*atom_numbers(left), *atom_numbers(right)]
         case _:
             return []
+
+
+def locate(network: Network, numbers: Int64) -> tuple[Int64, NDArray[np.bool_]]:
+    """Index of each of some atoms in the network, -1 for known ones; and their truth."""
+    index = np.searchsorted(network.atoms, numbers)
+    inside = np.minimum(index, max(network.n_atoms - 1, 0))
+    unknown = network.atoms[inside] == numbers if network.n_atoms else np.zeros(len(numbers), bool)
+    truth = np.zeros(len(numbers), bool)
+    truth[~unknown] = network.evidence.is_true(numbers[~unknown])
+    return np.where(unknown, index, -1), truth

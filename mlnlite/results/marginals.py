@@ -134,9 +134,10 @@ class Marginals(Rows[float]):
         }
 
     def columns(self) -> dict[str, list[Any]]:
-        """All that is known of each row, by name of the column; what sampling adds only if there was any."""
-        sampled = {"low": self.low, "high": self.high, "r_hat": self.r_hat, "effective_size": self.effective_size}
-        given = sampled if self.draws else {}
+        """All that is known of each row, by name of the column; intervals and what sampling adds if there are any."""
+        given = {} if self.exact.all() else {"low": self.low, "high": self.high}
+        if self.draws:
+            given |= {"r_hat": self.r_hat, "effective_size": self.effective_size}
         numbers = {
             name: [json_number(x) for x in values.tolist()] for name, values in given.items() if values is not None
         }

@@ -115,6 +115,9 @@ def test_a_result_says_how_much_may_be_left_out():
     assert set(result.methods) == {BOUNDED}
     assert " within " in result.to_text()
     assert ((result.low < result.probabilities) & (result.probabilities < result.high)).all()
+    for row in result.to_dict()["marginals"]:
+        assert 0 <= row["low"] < row["probability"] < row["high"] <= row["low"] + 2 * row["error"]
+        assert "r_hat" not in row
 
 
 def test_one_atom_alone_is_answered_within_the_same_bound():

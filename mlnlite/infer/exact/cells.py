@@ -77,12 +77,6 @@ def fragment_of(model: Model, evidence: Evidence) -> Fragment | str:
     return _weighted(templates, types[0], unary, binary)
 
 
-def n_lifted_atoms(fragment: Fragment, evidence: Evidence) -> int:
-    """How many ground atoms the predicates of a fragment have."""
-    n = int(evidence.present[fragment.type][0].sum())
-    return len(fragment.unary) * n + len(fragment.binary) * n**2
-
-
 def _why_not(template: Template) -> str:
     """Why a formula is outside of the fragment; empty if it is not."""
     formula = template.formula

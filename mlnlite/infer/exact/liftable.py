@@ -1,81 +1,89 @@
-"""Answers without grounding, where that is possible: comes in a model and evidence, goes out a result, or none."""
+"""The cell algorithm for classes of constants: comes in a group with classes, go out probabilities and log means."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from time import perf_counter
 
 import numpy as np
 
-from mlnlite.errors import Contradiction, LimitReached, QueryMistake
+from mlnlite.errors import Contradiction
+from mlnlite.ground.assemble import atom_range
+from mlnlite.ground.network import Float, Int64
 from mlnlite.infer.conflict import contradiction_of
-from mlnlite.infer.exact.cells import LIFTED, WORTH_LIFTING, Fragment, fragment_of, n_lifted_atoms
-from mlnlite.infer.query import Question, question_of
+from mlnlite.infer.exact.alike import Alike
+from mlnlite.infer.exact.cells import Fragment, fragment_of
+from mlnlite.infer.exact.remainder import remainder
+from mlnlite.infer.n_worlds import log_worlds
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.model.templates import Template
-from mlnlite.results import Marginals, Statistics
+
+Cells = tuple[Fragment, Model, Evidence]
+"""What is left of a group for the first tuple of a class, as a fragment and as it is."""
 
 
-def lifted_marginals(
-    model: Model, evidence: Evidence, query: str | Sequence[str], *, others_closed: bool, must: bool
-) -> Marginals | None:
-    """Answers without grounding, where a model is in the two-variable fragment.
+def cells_of(classes: Alike, model: Model, evidence: Evidence) -> list[Cells] | str:
+    """The cells of each class, or why it has none.
 
     Args:
-        model: as in `marginal`.
-        evidence: as in `marginal`.
-        query: as in `marginal`.
-        others_closed: whether the world is closed but for what is asked.
-        must: say why it is not possible, not None; and do it even if grounding would be cheap.
+        classes: of the constants of a group.
+        model: of the group.
+        evidence: about one database.
+    """
+    cells: list[Cells] = []
+    for number in range(len(classes.size)):
+        left = remainder(classes, number, model, evidence)
+        if left is None:
+            return "it needs one or two variables and no quantifier"
+        fragment = fragment_of(*left)
+        if isinstance(fragment, str):
+            return fragment
+        if classes.group.open - {*fragment.unary, *fragment.binary}:
+            return "some formulas have no weight for some constants"
+        cells.append((fragment, *left))
+    return cells
+
+
+def by_cells(
+    classes: Alike, cells: Sequence[Cells], evidence: Evidence, asked: tuple[Int64, Int64]
+) -> tuple[Float, float]:
+    """Probabilities of atoms, and the log of the mean weight of what the group says, over all worlds of its atoms.
+
+    Args:
+        classes: of the constants of a group.
+        cells: of each class.
+        evidence: as for `cells_of`.
+        asked: shape (n,) each: atoms about the first tuples of classes, and these classes.
 
     Raises:
-        QueryMistake: it is not possible.
-        LimitReached: it would take too long.
+        LimitReached: the sums would have too many terms.
         Contradiction: no world is possible; names hard formulas that exclude each other.
     """
-    start = perf_counter()
-    fragment = "worlds are closed but for what is asked" if others_closed else fragment_of(model, evidence)
-    if isinstance(fragment, str):
-        if must:
-            raise QueryMistake(f"no lifted inference for this model: {fragment}")
-        return None
-    question = question_of(query, model, evidence, lasting=False) if must or _is_large(fragment, evidence) else None
-    if question is None or not _fits(question, fragment):
-        if must:
-            raise QueryMistake("lifted inference answers atoms of predicates that formulas mention, nothing else")
-        return None
     from mlnlite.infer.exact.lifted import classes_of, lifted_probabilities
 
-    try:
-        probability, log_z = lifted_probabilities(classes_of(fragment, evidence), evidence, question.atoms)
-    except LimitReached:
-        if must:
-            raise
-        return None
-    except Contradiction as error:
-        raise contradiction_of(_conflict(model, evidence)) from error
-    n = len(probability)
-    return Marginals(
-        names=tuple(evidence.atom_texts(question.atoms)),
-        probabilities=probability,
-        methods=(LIFTED,) * n,
-        exact=np.ones(n, np.bool_),
-        error=np.zeros(n),
-        log_z=log_z,
-        statistics=Statistics(n_lifted_atoms(fragment, evidence), seconds={"infer": perf_counter() - start}),
-    )
+    (numbers, of), log_mean = asked, 0.0
+    probability = np.full(len(numbers), np.nan)
+    for number, (fragment, model, left) in enumerate(cells):
+        rows = np.flatnonzero(of == number)
+        atoms = _without_separators(numbers[rows], classes, evidence, left)
+        try:
+            probability[rows], log_z = lifted_probabilities(classes_of(fragment, left), left, atoms)
+        except Contradiction as error:
+            raise contradiction_of(_conflict(model, left)) from error
+        log_mean += int(classes.size[number]) * (log_z - log_worlds(left, classes.group.open))
+    return probability, log_mean
 
 
-def _is_large(fragment: Fragment, evidence: Evidence) -> bool:
-    """Whether grounding would take longer."""
-    return n_lifted_atoms(fragment, evidence) >= WORTH_LIFTING
-
-
-def _fits(question: Question, fragment: Fragment) -> bool:
-    """Whether it asks for atoms of predicates in formulas, and nothing else."""
-    return not question.formulas and question.predicates <= {*fragment.unary, *fragment.binary}
+def _without_separators(numbers: Int64, classes: Alike, evidence: Evidence, left: Evidence) -> Int64:
+    """Atoms about the first tuple of a class by their numbers in what is left for it."""
+    found = numbers.copy()
+    for name in classes.group.open:
+        low, high = atom_range(evidence.predicates[name], evidence)
+        mine = (numbers >= low) & (numbers < high)
+        places = [s.at[name] for s in classes.separators]
+        found[mine] = left.atom_number(name, np.delete(evidence.arguments_of(name, numbers[mine]), places, axis=1))
+    return found
 
 
 def _conflict(model: Model, evidence: Evidence) -> list[Template]:

@@ -13,7 +13,7 @@ from math import prod
 import numpy as np
 from scipy.special import gammaln, logsumexp
 
-from mlnlite.errors import Contradiction, Diagnostic, LimitReached, QueryMistake
+from mlnlite.errors import Contradiction, Diagnostic, LimitReached
 from mlnlite.ground.network import Bool, Float, Int64
 from mlnlite.infer.exact.cells import Fragment, groups_of
 from mlnlite.model.evidence import Evidence
@@ -132,11 +132,10 @@ def lifted_probabilities(classes: Classes, evidence: Evidence, atoms: Int64) -> 
     Args:
         classes: of the constants.
         evidence: of the atoms.
-        atoms: shape (n,), numbers.
+        atoms: shape (n,), numbers of atoms of these.
 
     Raises:
         Contradiction: no world is possible.
-        QueryMistake: an atom of another predicate is asked for.
     """
     fragment = classes.fragment
     log_z = log_sum(classes)
@@ -151,10 +150,8 @@ def lifted_probabilities(classes: Classes, evidence: Evidence, atoms: Int64) -> 
         if name in fragment.unary:
             column = fragment.unary.index(name)
             found[rows] = _alone(classes, log_z, fragment.cells[:, column])[classes.of[atoms[rows] - low]]
-        elif name in fragment.binary:
-            found[rows] = _pairs(classes, log_z, fragment.binary.index(name), np.divmod(atoms[rows] - low, n))
         else:
-            raise QueryMistake(f"no formula mentions {name}", hint="its atoms are true with probability 1/2")
+            found[rows] = _pairs(classes, log_z, fragment.binary.index(name), np.divmod(atoms[rows] - low, n))
     return found, log_z
 
 
