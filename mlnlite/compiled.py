@@ -85,10 +85,11 @@ def _announce_compiling() -> None:
     depth, due, reminders = [0], [0.0], list[Timer]()
 
     def remind() -> None:
-        if monotonic() >= due[0]:
+        if depth[0] and monotonic() >= due[0]:
             _say("compiling more of it" if due[0] else _FIRST)
             due[0] = monotonic() + _EVERY
-        reminders[:] = [_later(_EVERY, remind)]
+        if depth[0]:
+            reminders[:] = [_later(_EVERY, remind)]
 
     class Announcer(numba_events.Listener):  # type: ignore[misc]
         """Hears of functions and of those that they call, which are compiled meanwhile."""

@@ -68,7 +68,8 @@ def test_marginals_travel():
     data = json.loads(marginals().to_json())
     assert data["log_z"] == 1.5
     assert data["marginals"][4] == {
-        "name": NAMES[4], "probability": 0.125, "method": "gibbs", "exact": False, "error": 0.004, "low": 0.117, "high": 0.133,
+        "name": NAMES[4], "probability": 0.125, "method": "gibbs", "exact": False, "error": 0.004,
+        "low": 0.117, "high": 0.133,
     }  # fmt: skip
     assert data["statistics"]["seconds"] == {"ground": 0.25}
     empty = Marginals((), np.zeros(0), (), np.zeros(0, bool), np.zeros(0))

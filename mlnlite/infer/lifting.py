@@ -13,7 +13,7 @@ from math import prod
 import numpy as np
 
 from mlnlite.errors import LimitReached, QueryMistake
-from mlnlite.ground.assemble import atom_range, first_of_block, unknown
+from mlnlite.ground.assemble import atom_range, first_of_block, known_atoms
 from mlnlite.ground.forecast import Limits
 from mlnlite.ground.ground import ground
 from mlnlite.ground.network import Bool, Float, Int64
@@ -27,6 +27,7 @@ from mlnlite.infer.exact.separators import Group, Separator, groups_of, separato
 from mlnlite.infer.marginal.ladder import solve
 from mlnlite.infer.n_worlds import log_worlds_of
 from mlnlite.infer.query import Question, atom_numbers, locate
+from mlnlite.model.change import find
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.model import Model
 from mlnlite.model.soft import soft_templates
@@ -174,12 +175,14 @@ class _Asked:
 
 def _asked(group: Group, classes: Alike, evidence: Evidence, atoms: Int64) -> _Asked:
     """Those of some atoms that a group answers."""
-    open_atoms, parts = unknown(np.unique(atoms), evidence), []
+    parts = []
     for name in sorted(group.open):
-        low, high = atom_range(evidence.predicates[name], evidence)
-        rows = np.flatnonzero((atoms >= low) & (atoms < high) & np.isin(atoms, open_atoms))
+        predicate = evidence.predicates[name]
+        low, high = atom_range(predicate, evidence)
+        rows = np.flatnonzero((atoms >= low) & (atoms < high))
+        rows = rows[~find(known_atoms(predicate, evidence), atoms[rows])[1]]
         arguments = evidence.arguments_of(name, atoms[rows]).astype(np.int64)
-        here = [evidence.present[t][0][c] for t, c in zip(evidence.predicates[name].types, arguments.T, strict=True)]
+        here = [evidence.present[t][0][c] for t, c in zip(predicate.types, arguments.T, strict=True)]
         keep = np.all(here, axis=0) if here else np.ones(len(rows), np.bool_)
         of, there = classes.moved(name, arguments[keep])
         parts.append((rows[keep], evidence.atom_number(name, there.astype(np.int32)), of))
