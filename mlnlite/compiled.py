@@ -89,7 +89,7 @@ def _announce_compiling() -> None:
             _say("compiling more of it" if due[0] else _FIRST)
             due[0] = monotonic() + _EVERY
         if depth[0]:
-            reminders[:] = [_later(_EVERY, remind)]
+            reminders[:] = [_later(max(due[0] - monotonic(), 0.01), remind)]
 
     class Announcer(numba_events.Listener):  # type: ignore[misc]
         """Hears of functions and of those that they call, which are compiled meanwhile."""

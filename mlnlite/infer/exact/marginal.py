@@ -15,6 +15,7 @@ from mlnlite.infer.exact.elimination import log_sum
 from mlnlite.infer.exact.order import TooWide, plan
 from mlnlite.infer.reduce.conjunctions import starts_of
 from mlnlite.infer.reduce.fold import fold, unfold
+from mlnlite.infer.reduce.jointly import jointly
 from mlnlite.infer.reduce.parts import Batch, Division, Part, Summed, batches, divide, identity, parts
 from mlnlite.infer.reduce.peel import (
     Gone,
@@ -226,9 +227,26 @@ def _summed(part: Part, wanted: Bool, limits: tuple[int, int], found: Distributi
     """Sums over all worlds of a large component, with tables of so many entries, and so many in all."""
     tree = plan(part.cardinality, [c.scope for c in part.cells], *limits)
     if isinstance(tree, TooWide):
-        return tree
+        return _summed_jointly(part, wanted, limits, found) or tree
     found.largest_table = max(found.largest_table, *tree.sizes)
     return Summed(*log_sum(tree, part.cardinality, part.cells, wanted), ELIMINATION)
+
+
+def _summed_jointly(part: Part, wanted: Bool, limits: tuple[int, int], found: Distributions) -> Summed | None:
+    """As `_summed`, with variables as one where hard formulas leave few joint states; None if that does not help."""
+    joint = jointly(part)
+    if joint is None:
+        return None
+    small = joint.part
+    tree = plan(small.cardinality, [c.scope for c in small.cells], *limits)
+    if isinstance(tree, TooWide):
+        return None
+    found.largest_table = max(found.largest_table, *tree.sizes)
+    asked = np.zeros(len(small.cardinality), np.bool_)
+    asked[joint.owner[wanted]] = True
+    log_z, every = log_sum(tree, small.cardinality, small.cells, asked)
+    mine = {v: joint.distribution(v, every[joint.owner[v]]) for v in np.flatnonzero(wanted).tolist() if every}
+    return Summed(log_z, mine, ELIMINATION)
 
 
 def _enter(part: Part, summed: Summed | TooWide, found: Distributions) -> None:
