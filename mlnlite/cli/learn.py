@@ -251,10 +251,19 @@ def _database_weights(databases: Evidence, times: tuple[str, ...]) -> list[float
     for one in times:
         file, _, number = one.rpartition("=")
         match = [name for name in found if file in (name, Path(name).name)]
-        if not match or not number.replace(".", "", 1).isdigit():
-            raise click.UsageError(f"--times takes FILE=N with one of the database files and a number, found {one}")
-        found |= dict.fromkeys(match, float(number))
+        often = _number(number)
+        if not match or not 0 < often < float("inf"):
+            message = f"--times takes FILE=N with one of the database files and a positive number, found {one}"
+            raise click.UsageError(message)
+        found |= dict.fromkeys(match, often)
     return [found[name.rpartition("#")[0]] for name in databases.names]
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
 
 
 def _write_path(learned: LearnedModel, file: Path) -> None:
@@ -276,7 +285,8 @@ def _with_rules(model: Model, databases: Evidence, options: _Options) -> Model:
     import mlnlite as ml
 
     predict = names(options["predict"])
-    others = [name for name in model.predicates if name not in _predicates(predict)]
+    every = (name for name, predicate in model.predicates.items() if predicate.comparison is None)
+    others = [name for name in every if name not in _predicates(predict)]
     given = names(options["given"]) or others
     with working("looking for rules"):
         found = ml.find_rules(

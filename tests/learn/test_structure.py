@@ -135,6 +135,14 @@ def test_rules_about_constants_are_found(dialect):
     assert found.rules[0].text in {f"level({x}, Low) => way({x}, {way})" for way in ("Near", "Far")}
 
 
+def test_comparisons_are_no_predicates_of_rules():
+    model = ml.model_from_text("age(p, int!)\nS(p)\nC(p)\nage(x, a) ^ a > 30 => C(x)")
+    people = [f"age(P{i}, {20 + i % 20})" + f"\nS(P{i})\nC(P{i})" * (i % 2) for i in range(60)]
+    data = ml.evidence_from_text("\n".join(people), model=model)
+    found = find_rules(model, data, predict=["C"], most_literals=1, resamples=0)
+    assert "S(x) => C(x)" in {r.text for r in found.rules}
+
+
 def test_no_candidate_is_refused():
     model = ml.model_from_text("S(p)\nH(q)\n")
     data = ml.evidence_from_text("S(A)\nH(B)", model=model)

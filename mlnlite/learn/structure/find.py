@@ -120,7 +120,8 @@ def find_rules(  # noqa: PLR0913
         QueryMistake: if there is no candidate, or a mode does not fit.
     """
     heads = modes_of(predict, model.predicates)
-    bodies = modes_of(model.predicates if given is None else given, model.predicates)
+    every = (name for name, predicate in model.predicates.items() if predicate.comparison is None)
+    bodies = modes_of(every if given is None else given, model.predicates)
     targets = target_names(databases, {mode.predicate: None for mode in heads})
     unknown = opened(model, open_predicates)
     language = Language(model.predicates, databases.types, heads, bodies)
