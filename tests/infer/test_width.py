@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from itertools import permutations
 
+import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlnlite.infer.exact.width import unavoidable_table
+import mlnlite as ml
+from mlnlite.infer.exact.width import is_tangled, unavoidable_table
+from mlnlite.infer.reduce.potentials import potentials_of
 
 
 @st.composite
@@ -53,3 +56,17 @@ def test_cliques_and_dense_minors_are_seen():
 def test_a_forest_is_narrow():
     path = [{v - 1, v + 1} - {-1, 100} for v in range(100)]
     assert unavoidable_table(path, [1.0] * 100, 2.0) is None
+
+
+def test_counts_over_rows_and_columns_are_a_tangle():
+    k = 12
+    names = ", ".join(f"C{i}" for i in range(k))
+    text = f"A(r, s)\nr = {{{names}}}\ns = {{{names}}}\n"
+    model = ml.model_from_text(text + "0.7 count(A(x, y) | y) <= 3\n-0.4 count(A(x, y) | x) >= 5\n0.1 A(x, y)\n")
+    network = ml.ground(model, ml.no_evidence(model))
+    potentials = potentials_of(network, chained=True)
+    everything = np.ones(len(potentials.cardinality), np.bool_)
+    assert is_tangled(potentials, everything, 2**10)
+    assert not is_tangled(potentials, everything, 2**14)
+    nothing = np.zeros(len(potentials.cardinality), np.bool_)
+    assert not is_tangled(potentials, nothing, 2**10)

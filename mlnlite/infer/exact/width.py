@@ -9,6 +9,13 @@ values of each variable, of two that are contracted the smaller).
 from __future__ import annotations
 
 from heapq import heapify, heappop, heappush
+from itertools import combinations
+from math import log2
+
+import numpy as np
+
+from mlnlite.ground.network import Bool
+from mlnlite.infer.reduce.potentials import Potentials
 
 
 def unavoidable_table(adjacent: list[set[int]], bits: list[float], limit: float) -> tuple[int, float] | None:
@@ -60,3 +67,26 @@ def _contract(adjacent: list[set[int]], bits: list[float], weight: list[float], 
     for u in (into, *adjacent[into]):
         weight[u] -= less
     return near | adjacent[into]
+
+
+def is_tangled(potentials: Potentials, variables: Bool, limit: int) -> bool:
+    """Whether counting factors tie variables together so closely that writing them out as tables is of no use.
+
+    Each one counts as a single variable of two values next to all that it counts: the tables have that as a minor.
+
+    Args:
+        potentials: with chains.
+        variables: shape (n,), of one component.
+        limit: largest number of entries of a table.
+    """
+    n, chains = len(potentials.cardinality), [row for c in potentials.chains for row in c.variable]
+    adjacent: list[set[int]] = [set() for _ in range(n + len(chains))]
+    pairs = [(n + i, v) for i, row in enumerate(chains) for v in row[variables[row]].tolist()]
+    for cells in potentials.cells:
+        of_part = cells.scope[variables[cells.scope].all(axis=1)]
+        pairs += [(a, b) for scope in np.unique(of_part, axis=0).tolist() for a, b in combinations(scope, 2)]
+    for a, b in pairs:
+        adjacent[a].add(b)
+        adjacent[b].add(a)
+    bits = [*np.log2(np.maximum(potentials.cardinality, 2)).tolist(), *[1.0] * len(chains)]
+    return unavoidable_table(adjacent, bits, log2(limit) + 1e-9) is not None

@@ -20,10 +20,11 @@ from mlnlite.infer.exact.wmc import MODEL_COUNTING, count_models, is_available, 
 from mlnlite.infer.query import atom_numbers
 from mlnlite.infer.reduce.components import components_of
 from mlnlite.infer.reduce.parts import Part, Summed
+from mlnlite.infer.reduce.potentials import potentials_of
 from mlnlite.model.formulas import Expression
 
-_SHARE, _PART, _CHEAP, _FAIR = 6, 10, 1 << 18, 1 << 22
-"""Of the time, for model counting; of the precision, for what is left out; entries of first and second tables."""
+_SHARE, _PART, _CHEAP, _FAIR, _FEW = 6, 10, 1 << 18, 1 << 22, 8
+"""Of the time, for model counting; of the precision, for what is left out; entries of first and second tables; few."""
 
 
 @dataclass(slots=True)
@@ -126,6 +127,9 @@ def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple
     from mlnlite.ground.patterns import with_counts
 
     counted, rung = with_counts(network), _rung_for_wide(network, approach)
+    for_sampling = counted
+    if len(counted.counts) > len(network.counts) and _are_tangled(counted, found, limit):
+        counted = network
     small, merged = _merged(counted, asked, found, approach, (limit, _FAIR))
     if merged is found and found.costly:  # nothing excludes each other, and larger tables may do
         merged = marginals_of(network, asked, width_limit=limit, too_wide="leave")
@@ -137,7 +141,22 @@ def _exactly(network: Network, asked: Int64 | None, approach: Approach) -> tuple
         small, merged = _merged(counted, asked, found, approach, (limit, None))
     if refuses and merged.wide:
         marginals_of(counted, asked, width_limit=limit, rung=rung)
-    return counted, small, merged
+    return for_sampling, small, merged
+
+
+def _are_tangled(counted: Network, found: AtomProbabilities, limit: int) -> bool:
+    """Whether what is too wide would remain so with counting factors."""
+    from mlnlite.infer.exact.width import is_tangled
+
+    potentials = potentials_of(counted, chained=True)
+    variables = np.zeros(len(potentials.cardinality), np.bool_)
+    wide = found.wide if len(found.wide) <= _FEW else ()
+    for component in wide:
+        variables[:] = False
+        variables[counted.variable[found.component == component]] = True
+        if not is_tangled(potentials, variables, limit):
+            return False
+    return bool(wide)
 
 
 def _merged(
