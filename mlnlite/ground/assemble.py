@@ -62,12 +62,7 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
         parts: one for each template.
         query: numbers of further atoms that are to be in the network unless they are known.
     """
-    asked = np.empty(0, np.int64) if query is None else unknown(np.unique(query), evidence)
-    known = [known_numbers(name, evidence) for name, p in evidence.predicates.items() if not p.closed]
-    listed = distinct(
-        [numbers_of(asked, evidence), *(a for part in parts for p in part.pieces for a in p.atoms)], known
-    )
-    variables = variables_of(atoms_numbered(listed, evidence), evidence)
+    variables = variables_of(_open_atoms(evidence, parts, query), evidence)
     first = np.cumsum([0, *(len(part.decided_true) for part in parts)])
     pieces = [(p, offset) for part, offset in zip(parts, first.tolist(), strict=False) for p in part.pieces]
     blocks = blocks_of(pieces, variables.atoms, evidence)
@@ -95,6 +90,19 @@ def network_of(model: Model, evidence: Evidence, parts: Sequence[Part], query: I
 # --- atoms and variables
 
 
+def _open_atoms(evidence: Evidence, parts: Sequence[Part], query: Int64 | None) -> Int64:
+    """Numbers of the unknown atoms that some piece has, or that are asked for, rising."""
+    asked = np.empty(0, np.int64) if query is None else unknown(distinct([query]), evidence)
+    listed = [a for part in parts for p in part.pieces for a in p.atoms]
+    n_listed = sum(map(len, listed))
+    known = [
+        known_numbers(name, evidence)
+        for name, predicate in evidence.predicates.items()
+        if not predicate.closed and len(evidence.facts[name].truth) < n_listed
+    ]
+    return atoms_numbered(distinct([numbers_of(asked, evidence), *listed], known), evidence)
+
+
 def distinct(numbers: Sequence[Int64], others: Sequence[Int64] = ()) -> Int64:
     """All numbers of some arrays, each once, rising.
 
@@ -107,7 +115,8 @@ def distinct(numbers: Sequence[Int64], others: Sequence[Int64] = ()) -> Int64:
         return np.empty(0, np.int64)
     low, high = min(first for _, first, _ in flat), max(last for _, _, last in flat)
     if high - low >= min(DENSEST, 16 * sum(len(n) for n, _, _ in flat) + 4096):
-        return np.unique(np.concatenate([n for n, _, _ in flat]))
+        every = np.sort(np.concatenate([n for n, _, _ in flat]))  # `np.unique`, which hashes, is slower
+        return np.asarray(every[np.append(True, every[1:] != every[:-1])])
     seen = np.zeros(high - low + 1, np.bool_)
     never = [n[(n >= low) & (n <= high)] - low for n in others]
     for n in never:
@@ -155,7 +164,7 @@ def _with_blocks(atoms: Int64, evidence: Evidence) -> tuple[Int64, Int64]:
         low, high = atom_range(predicate, evidence)
         mine = (atoms >= low) & (atoms < high)
         stride = strides(evidence, predicate.name)[predicate.value]
-        first = np.unique(first_of_block(atoms[mine], predicate, evidence))
+        first = distinct([first_of_block(atoms[mine], predicate, evidence)])
         values = np.flatnonzero(evidence.present[predicate.types[predicate.value]][0])
         members = (first[:, None] + values[None, :] * stride).ravel()
         members = members[~find(known_atoms(predicate, evidence), members)[1]]

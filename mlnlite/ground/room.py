@@ -25,11 +25,18 @@ Cut = Callable[[int, DTypeLike], NDArray[Any]]
 
 
 def long_array(n: int, kind: DTypeLike) -> NDArray[Any]:
-    """An array with anything in it."""
+    """An array with anything in it.
+
+    Raises:
+        MemoryError: if there is not so much.
+    """
     size = n * np.dtype(kind).itemsize
     if size < LONG or not hasattr(mmap, "MAP_PRIVATE"):
         return np.empty(n, kind)
-    return np.frombuffer(mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS), kind)
+    try:
+        return np.frombuffer(mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS), kind)
+    except OSError as error:
+        raise MemoryError(f"no {size:,} bytes") from error
 
 
 def room() -> Cut:
