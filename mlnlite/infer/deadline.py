@@ -55,7 +55,9 @@ def interruptible(deadline: Deadline) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {signal.SIGINT: signal.getsignal(signal.SIGINT)}
+    if callable(signal.getsignal(signal.SIGTERM)):
+        before[signal.SIGTERM] = signal.getsignal(signal.SIGTERM)
     terminated = []
 
     def stop(number: int, _: FrameType | None) -> None:
@@ -63,9 +65,8 @@ def interruptible(deadline: Deadline) -> Iterator[None]:
         signal.signal(number, before[signal.Signals(number)])
         terminated.extend([number] if number == signal.SIGTERM else [])
 
-    signal.signal(signal.SIGINT, stop)
-    if callable(before[signal.SIGTERM]):
-        signal.signal(signal.SIGTERM, stop)
+    for number in before:
+        signal.signal(number, stop)
     try:
         yield
     finally:
