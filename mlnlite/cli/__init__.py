@@ -70,7 +70,9 @@ class Commands(click.Group):
             except MlnError as error:
                 click.echo(_message(error, ctx.meta.get("mlnlite.format")), err=True)
                 ctx.exit(NO_ANSWER if isinstance(error, LimitReached) else USER_ERROR)
-            except KeyboardInterrupt:
+            except (KeyboardInterrupt, SystemExit) as error:
+                if isinstance(error, SystemExit) and not terminated:
+                    raise
                 click.echo("terminated" if terminated else "interrupted", err=True)
                 ctx.exit(TERMINATED if terminated else INTERRUPTED)
 
@@ -85,7 +87,7 @@ def _terminable() -> Iterator[list[int]]:
 
     def end(number: int, _: FrameType | None) -> None:
         received.append(number)
-        raise KeyboardInterrupt
+        raise SystemExit(TERMINATED)
 
     before = signal.signal(signal.SIGTERM, end)
     try:
