@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from math import prod
@@ -130,6 +130,9 @@ def _typed(formula: tree.Formula, model: Model, evidence: Evidence, mistakes: li
     constants = Constants({name: dict(t.index) for name, t in evidence.types.items()})
     typer = FormulaTyper(model.predicates, constants, mistakes)
     typed = typer.typed(formula)
+    for i, mistake in enumerate(mistakes[before:], before):
+        if mistake.code == "E202" and mistake.hint.startswith("declare"):
+            mistakes[i] = replace(mistake, hint=_some(list(model.predicates), "predicates"))
     if typer.comparisons.keys() - model.predicates.keys():
         hint = "ask for atoms, or put the comparison into a formula of the model"
         mistakes.append(
@@ -148,9 +151,9 @@ def _typed(formula: tree.Formula, model: Model, evidence: Evidence, mistakes: li
     return typed if len(mistakes) == before else None
 
 
-def _some(constants: list[str]) -> str:
-    shown = ", ".join(constants[:8]) + (", ..." if len(constants) > 8 else "")
-    return f"there are {shown}" if constants else "the type has no constants: give evidence"
+def _some(names: list[str], what: str = "constants") -> str:
+    shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+    return f"there are {shown}" if names else f"there are no {what}: give evidence"
 
 
 def _undecided(schema: AtomSchema) -> bool | None:

@@ -152,7 +152,8 @@ class FormulaTyper:
         predicate = self.predicates.get(atom.predicate)
         if predicate is None:
             hint = did_you_mean(atom.predicate, list(self.predicates)) or (
-                f"declare it: {atom.predicate}({', '.join('type' for _ in atom.arguments)})"
+                f"declare it: {atom.predicate}"
+                + (f"({', '.join('type' for _ in atom.arguments)})" * bool(atom.arguments))
             )
             self._mistake("E202", f"the predicate {atom.predicate} is not declared", atom.span, hint, "a predicate")
         elif len(atom.arguments) != predicate.arity:

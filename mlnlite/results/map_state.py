@@ -113,7 +113,8 @@ class MapState(Rows[bool]):
         if isfinite(self.cost):
             open_ = f"{self.open_cost:.6f} of it where evidence leaves a choice"
             summary.insert(0, f"cost: {self.cost:.6f}, {open_}; no world costs less than {self.cost - self.gap:.6f}")
-        return self.table(limit, [*paid, *summary, str(self.statistics)])
+        none = [] if self.truth.any() else [f"none of {len(self.names):,} atoms is true"]
+        return self.table(limit, [*none, *paid, *summary, str(self.statistics)])
 
     def head(self) -> tuple[str, ...]:
         """Names of the columns of the table."""

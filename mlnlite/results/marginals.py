@@ -76,7 +76,8 @@ class Marginals(Rows[float]):
             limit: show at most so many rows.
         """
         summary = [f"status: {self.status}"] + ([f"log Z = {self.log_z:.6f}"] if isfinite(self.log_z) else [])
-        return self.table(limit, [", ".join(summary), str(self.statistics)])
+        empty = [] if self.names else ["what is asked has no atoms: evidence, or the model, brings constants"]
+        return self.table(limit, [*empty, ", ".join(summary), str(self.statistics)])
 
     def head(self) -> tuple[str, ...]:
         """Names of the columns."""
