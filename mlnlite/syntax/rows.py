@@ -149,7 +149,10 @@ def _whole(pieces: list[Piece]) -> Piece:
     order = np.argsort(offsets) if (offsets[1:] < offsets[:-1]).any() else slice(None)
     columns = tuple(_joined(column)[order] for column in words)
     weights = _joined(weight)[order] if weight else None
-    return Piece(predicate, columns, _joined(truth)[order], _joined(database)[order], offsets[order], weights)
+    databases = _joined(database)[order]
+    if databases[0] == databases[-1] and (databases == databases[0]).all():
+        databases = np.broadcast_to(databases[0], len(databases))  # takes no memory
+    return Piece(predicate, columns, _joined(truth)[order], databases, offsets[order], weights)
 
 
 def _joined(parts: list[NDArray[Number]]) -> NDArray[Number]:
