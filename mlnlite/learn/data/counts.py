@@ -165,27 +165,27 @@ def joined(parts: list[Entries], n_weights: int) -> Entries:
     if not parts:
         empty = np.empty(0, np.int64)
         return Entries(empty, empty, empty, empty)
-    database, atom, weight, change = (
-        np.concatenate([getattr(p, name) for p in parts]) for name in ("database", "atom", "weight", "change")
-    )
-    low = int(atom.min()) if len(atom) else 0
-    width = int(atom.max(initial=low)) - low + 1
-    size = (int(database.max(initial=0)) + 1) * width * n_weights
+    low = min((int(p.atom.min()) for p in parts if len(p.atom)), default=0)
+    width = max(int(p.atom.max(initial=low)) for p in parts) - low + 1
+    size = (max(int(p.database.max(initial=0)) for p in parts) + 1) * width * n_weights
     if size >= 2**62:
-        return _sorted(database, atom, weight, change)
-    key = (database * width + (atom - low)) * n_weights + weight
-    key, total = _added(key, change, size)
+        return _sorted(parts)
+    keys = [(p.database * width + (p.atom - low)) * n_weights + p.weight for p in parts]
+    key, total = _added(keys, [p.change for p in parts], size)
     unit, weight = np.divmod(key, n_weights)
     database, atom = np.divmod(unit, width)
     return Entries(database, atom + low, weight, total)
 
 
-def _added(key: Int64, change: Int64, size: int) -> tuple[Int64, Int64]:
+def _added(keys: list[Int64], changes: list[Int64], size: int) -> tuple[Int64, Int64]:
     """Sums by key that are not zero, in order of keys. By a table where that is not much larger than the list."""
-    if size <= DENSE * len(key) + 1000:
-        total = np.bincount(key, change, size)
-        keys = np.flatnonzero(total)
-        return keys, total[keys].astype(np.int64)
+    if size <= DENSE * sum(map(len, keys)) + 1000:
+        sums = np.zeros(size, np.int64)
+        for key, change in zip(keys, changes, strict=True):
+            np.add.at(sums, key, change)
+        found = np.flatnonzero(sums)
+        return found, sums[found]
+    key, change = np.concatenate(keys), np.concatenate(changes)
     order = np.argsort(key)
     key, change = key[order], change[order]
     starts = np.flatnonzero(np.diff(key, prepend=-1))
@@ -194,8 +194,11 @@ def _added(key: Int64, change: Int64, size: int) -> tuple[Int64, Int64]:
     return key[starts][keep], total[keep]
 
 
-def _sorted(database: Int64, atom: Int64, weight: Int64, change: Int64) -> Entries:
+def _sorted(parts: list[Entries]) -> Entries:
     """The same for keys that do not fit into 64 bits."""
+    database, atom, weight, change = (
+        np.concatenate([getattr(p, name) for p in parts]) for name in ("database", "atom", "weight", "change")
+    )
     order = np.lexsort((weight, atom, database))
     database, atom, weight, change = (a[order] for a in (database, atom, weight, change))
     new = np.ones(len(order), bool)
