@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mlnlite.engines.plan import Engine
 from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
+from mlnlite.ground.ground import verify_same_vocabulary
 from mlnlite.infer.deadline import in_seconds, interruptible
 from mlnlite.learn.data.missing import is_incomplete
 from mlnlite.learn.learned import How, LearnedModel, Objective
@@ -85,6 +86,7 @@ def how_of(
     database_weights: Sequence[float] | None,
 ) -> How:
     """What is to be learnt, as the learnt model remembers it; `names` are those of what is predicted and open."""
+    verify_same_vocabulary(model, databases)
     predict = None if names[0] is None else predicates_named(model, names[0], "predict")
     unknown = opened(model, names[1])
     return How(

@@ -81,3 +81,10 @@ def test_data_violate_a_hard_formula_that_no_prediction_touches(hard, facts, obj
 def test_data_keep_a_hard_formula_over_many_constants():
     model, data = read("C(p)\nR(p, p)\nEXIST y R(x, y).\nC(x)", "R(A, B)\nR(B, A)\nR(D, D)\nR(E, F)\nR(F, A)\nC(A)")
     assert ml.learn(model, data, predict=["C"]).status == "converged"
+
+
+def test_evidence_that_was_read_for_another_model_is_refused():
+    _, data = read("S(p)\nG(p, k)\nS(x)", "S(A)\nG(A, K1)")
+    other = ml.model_from_text("S(p)\nG(p, k)\nk = {K9}\nG(x, +v) ^ S(x)")
+    with pytest.raises(ml.QueryMistake, match="read for another model"):
+        ml.learn(other, data)

@@ -135,6 +135,29 @@ def test_rules_about_constants_are_found(dialect):
     assert found.rules[0].text in {f"level({x}, Low) => way({x}, {way})" for way in ("Near", "Far")}
 
 
+def test_a_candidate_that_is_a_formula_of_the_model_is_another():
+    """The hard formula holds in what is drawn, though a candidate says the same."""
+    model = ml.model_from_text("S(p)\nC(p)\nS(x) => C(x).")
+    facts = [f"S(P{i})\nC(P{i})" for i in range(20)] + [f"?S(Q{i})\n?C(Q{i})" for i in range(20)]
+    data = ml.evidence_from_text("\n".join(facts) + "\np = {R1, R2, R3}", model=model)
+    found = find_rules(model, data, predict=["C"], given=["S"], resamples=0)
+    assert found.model.templates[0].hard
+
+
+def test_models_with_rules_fit_the_databases():
+    """A rule that names the second constant of its type only."""
+    model = ml.model_from_text("G(p, k!)\nS(p)")
+    lines = [f"G(P{i}, {('K1', 'K2', 'K3')[i % 3]})" + f"\nS(P{i})" * (i % 3 == 1) for i in range(60)]
+    data = ml.evidence_from_text("\n".join(lines), model=model)
+    found = find_rules(model, data, predict=["S"], given=["G(+, #)"], resamples=0)
+    assert [r.text for r in found.rules] == ["G(x, K2) => S(x)"]
+    assert found.model.types["k"].constants == data.types["k"].constants
+    learned = ml.learn(found.model, data, predict=["S"])
+    assert learned.weights[-1] > 3
+    asked = ml.evidence_from_text("G(Z, K2)\nG(Y, K3)", model=learned.model)
+    assert ml.marginal(learned.model, asked, ["S"])["S(Z)"] > 0.8
+
+
 def test_comparisons_are_no_predicates_of_rules():
     model = ml.model_from_text("age(p, int!)\nS(p)\nC(p)\nage(x, a) ^ a > 30 => C(x)")
     people = [f"age(P{i}, {20 + i % 20})" + f"\nS(P{i})\nC(P{i})" * (i % 2) for i in range(60)]

@@ -28,7 +28,7 @@ from mlnlite.learn.optimise.solve import best
 from mlnlite.learn.prior import Penalty
 from mlnlite.learn.structure.candidates import Language, candidates, rule_text
 from mlnlite.learn.structure.impute import Hidden, completions, hidden, problem_with
-from mlnlite.learn.structure.modes import modes_of
+from mlnlite.learn.structure.modes import Mode, modes_of
 from mlnlite.learn.weights import opened
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import AtomRef
@@ -122,6 +122,7 @@ def find_rules(  # noqa: PLR0913
     heads = modes_of(predict, model.predicates)
     every = (name for name, predicate in model.predicates.items() if predicate.comparison is None)
     bodies = modes_of(every if given is None else given, model.predicates)
+    model = _with_constants(model, databases, [*heads, *bodies])
     targets = target_names(databases, {mode.predicate: None for mode in heads})
     unknown = opened(model, open_predicates)
     language = Language(model.predicates, databases.types, heads, bodies)
@@ -154,6 +155,13 @@ class _Task:
 
 def _expanded(model: Model, databases: Evidence) -> Model:
     return replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
+
+
+def _with_constants(model: Model, databases: Evidence, modes: Sequence[Mode]) -> Model:
+    """A model that has the constants that rules may name in the order of the databases."""
+    of = {m.predicate: model.predicates[m.predicate].types for m in modes}
+    named = {t for m in modes for t, sign in zip(of[m.predicate], m.signs, strict=True) if sign == "#"}
+    return replace(model, types={n: databases.types[n] if n in named else t for n, t in model.types.items()})
 
 
 def _with_rules(model: Model, rules: Sequence[str]) -> Model:
@@ -219,12 +227,14 @@ class _Found:
 
 def _search_incomplete(task: _Task, unknown: Hidden, random: np.random.Generator) -> _Found:
     """Rule by rule: what is unknown is drawn from a model with the rules found so far."""
-    every, rules = _expanded(task.every, unknown.databases), set(task.rules)
-    model = _expanded(_with_units(task.every, sorted(unknown.names)), unknown.databases)
+    every = _expanded(task.every, unknown.databases)
+    templates = _expanded(_with_units(task.every, sorted(unknown.names)), unknown.databases).templates
+    first, end = len(every.templates) - len(task.rules), len(every.templates)
     scores: dict[str, float] = {}
     for _ in range(task.most_rules):
-        chosen = tuple(t for t in model.templates if t.text not in rules or t.text in scores)
-        drawn = completions(unknown, replace(model, templates=chosen), task.targets, random)
+        chosen = tuple(t for t in templates[first:end] if t.text in scores)
+        model = replace(every, templates=(*templates[:first], *chosen, *templates[end:]))
+        drawn = completions(unknown, model, task.targets, random)
         step = replace(task, most_rules=len(scores) + 1)
         found = _search(step, problem_with(unknown, every, drawn, task.targets), scores)
         new = found.rules.keys() - scores.keys()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mlnlite.errors import LimitReached, QueryMistake
+from mlnlite.ground.ground import verify_same_vocabulary
 from mlnlite.learn.data.merge import Choices
 from mlnlite.learn.data.missing import is_incomplete
 from mlnlite.learn.learned import How, LearnedModel, Objective, targets_of
@@ -143,6 +144,7 @@ def held_out(learned: LearnedModel, databases: Evidence) -> float:
 
 def unseen(model: Model, databases: Evidence, how: How) -> Problem:
     """The likelihood of databases that a model has not seen, with all weights free that are not hard."""
+    verify_same_vocabulary(model, databases)
     objective: Objective = "likelihood" if has_unknown(model, databases, how) else "pseudo-likelihood"
     how = replace(how, objective=objective, tied=(), database_weights=None)
     free = (replace(t.expanded(databases.types), fixed=t.hard) for t in model.templates)

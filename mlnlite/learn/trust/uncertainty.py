@@ -217,10 +217,7 @@ def _bootstrap(learned: LearnedModel, databases: Evidence, level: float, repetit
     spread = np.cov(np.where(finite, table, 0.0).T, ddof=1).reshape(table.shape[1], table.shape[1])
     covariance = sparse.csr_array(spread)
     sd = _sd(covariance, learned)
-    away = np.subtract(table, learned.weights, out=np.zeros(table.shape), where=finite)
-    shift = np.quantile(away, [0.5 + level / 2, 0.5 - level / 2], axis=0)
-    low, high = learned.weights - shift[0], learned.weights - shift[1]
-    missing = np.isnan(sd)
-    low, high = (np.where(missing, np.nan, end) for end in (low, high))
+    half = norm.ppf(0.5 + level / 2) * sd
+    low, high = learned.weights - half, learned.weights + half
     drawn = f"components of more than {MOST_WORLDS:,} worlds were drawn by sampling, {APART} sweeps apart, not exactly"
     return Uncertainty(sd, low, high, level, "bootstrap", 0, covariance, (drawn,) if approximate else ())
