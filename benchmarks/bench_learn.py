@@ -16,7 +16,7 @@ from mlnlite.learn.objectives.choose import Search, solved, task_of
 from mlnlite.learn.prior import Gaussian
 from mlnlite.model.evidence import Facts
 from mlnlite.model.symbols import Type
-from tests.learn.test_structure import PLANTED, f1, planted
+from tests.learn.test_structure import GIVEN, PLANTED, f1, planted, planted_lines, without
 from tests.learn.test_uncertainty import coverage
 
 SMOKERS = """Smokes(person)
@@ -100,6 +100,25 @@ def test_intervals_hold_the_truth(benchmark):
 def test_planted_rules(benchmark):
     """Three rules among 45 candidates, 10^5 facts."""
     model, data = planted(26_000, 0)
-    given = ["Smokes", "Sporty", "Coffee", "Rich", "Friends"]
-    found = benchmark.pedantic(lambda: ml.find_rules(model, data, predict=["Ill"], given=given), rounds=1)
+    found = benchmark.pedantic(lambda: ml.find_rules(model, data, predict=["Ill"], given=GIVEN), rounds=1)
     assert f1({rule.text for rule in found.rules}, PLANTED) >= 0.95
+
+
+def test_planted_rules_with_missing_labels(benchmark):
+    """The same with 30 % of what the rules conclude marked unknown."""
+    model, lines = planted_lines(26_000, 0)
+    data = ml.evidence_from_text("\n".join(without(lines, {"Ill": 0.3}, 26_000)), model=model)
+    found = benchmark.pedantic(lambda: ml.find_rules(model, data, predict=["Ill"], given=GIVEN), rounds=1)
+    assert f1({rule.text for rule in found.rules}, PLANTED) >= 0.95
+
+
+def test_quantifiers_over_pairs(benchmark):
+    """Pairs of unknown atoms among 1000 constants."""
+    n, random = 1000, np.random.default_rng(0)
+    facts = [f"S(P{i})" for i in range(0, n, 2)]
+    facts += [f"A(P{a}, P{b})" for a, b in random.integers(0, n, (3 * n, 2)).tolist()]
+    facts += [f"A(P{b}, P{a})" for a, b in random.integers(0, n, (n, 2)).tolist()]
+    model = ml.model_from_text("S(p)\nA(p, p)\nA(x, y)\nS(x)\nEXIST y (A(x, y) ^ A(y, x))")
+    data = ml.evidence_from_text("\n".join(dict.fromkeys(facts)), model=model)
+    learned = benchmark.pedantic(lambda: ml.learn(model, data), rounds=1)
+    assert learned.status == "converged"
