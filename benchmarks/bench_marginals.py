@@ -26,7 +26,7 @@ def test_effective_samples_per_second(benchmark, name, method):
     start, begin = time.process_time(), time.perf_counter()
     found = benchmark.pedantic(solve, (net, np.arange(net.n_atoms), (), Approach(method, precision=0.02)), rounds=1)
     seconds, wall = time.process_time() - start, time.perf_counter() - begin
-    least, worst = float(np.nanmin(found.size)), float(np.nanmax(found.r_hat))
+    least, worst = float(np.nanmin(found.columns.size)), float(np.nanmax(found.columns.r_hat))
     said = {"least effective size": least, "worst R-hat": worst, "least per CPU second": least / seconds}
     benchmark.extra_info |= said
     rare = sum("never seen otherwise" in m for m in found.methods)

@@ -55,12 +55,11 @@ def compiled_part(function: Callable[..., Any]) -> Any:  # noqa: ANN401
 
 @cache
 def _load_compiler() -> None:
-    """Loads Numba with all that it has to know before it compiles, and has it say so when it does."""
+    """Loads Numba, and has it say so when it compiles."""
     prepare_cache()
     slow = _later(_PATIENCE, lambda: _say("loading the compiler"))
     try:
-        registry: Any = import_module("numba.core.registry")
-        registry.cpu_target.target_context.refresh()
+        import_module("numba")
     finally:
         slow.cancel()
     _announce_compiling()

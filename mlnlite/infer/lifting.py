@@ -201,7 +201,7 @@ def _by_representatives(
     network = ground(replace(found.model, templates=templates), facts, query=asked.number, limits=limits[1])
 
     every, approach = np.arange(network.n_atoms), Approach("exact", limits[0])
-    probability = solve(network, every, (), approach).probability[locate(network, asked.number)[0]]
+    probability = solve(network, every, (), approach).columns.probability[locate(network, asked.number)[0]]
     log_mean = 0.0
     for times, which in _shares(classes.size):
         part = replace(network, weights=np.where(which[owner], network.weights, 0.0))

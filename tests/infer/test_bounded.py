@@ -78,16 +78,16 @@ def test_components_that_are_too_wide_are_answered(weight):
     approach = Approach("exact" if weight == np.inf else "auto", width_limit=1 << 8)
     both = All((AtomRef(0), AtomRef(5)))
     solution = solve(net, np.arange(net.n_atoms), [both], approach)
-    expected = solve(net, np.arange(net.n_atoms), [both], Approach("exact"))
-    np.testing.assert_array_less(np.abs(solution.probability - expected.probability), solution.error + 1e-9)
-    assert (solution.low <= expected.probability + 1e-9).all()
-    assert (solution.high >= expected.probability - 1e-9).all()
+    expected = solve(net, np.arange(net.n_atoms), [both], Approach("exact")).columns.probability
+    np.testing.assert_array_less(np.abs(solution.columns.probability - expected), solution.columns.error + 1e-9)
+    assert (solution.columns.low <= expected + 1e-9).all()
+    assert (solution.columns.high >= expected - 1e-9).all()
     if weight == np.inf:
-        assert solution.exact.all()
+        assert solution.columns.exact.all()
         assert solution.log_z == pytest.approx(exact.log_z, abs=1e-9)
     else:
         assert set(solution.methods) == {BOUNDED}
-        assert 0 < solution.error.max() < 5e-4
+        assert 0 < solution.columns.error.max() < 5e-4
         assert np.isnan(solution.log_z)
 
 

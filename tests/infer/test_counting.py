@@ -88,7 +88,7 @@ def test_chains_start_and_stay_where_hard_counts_allow():
     at = possible[0]
     assert can_differ(net, np.arange(net.n_atoms), at).tolist() == (possible != at).any(axis=0).tolist()
     found = sample(net, np.ones(net.n_variables, bool), (np.arange(net.n_atoms), ()), "mcsat", Effort(0.01, 30.0))
-    assert (np.abs(found.probability - marginals_of(net).probability) < 5 * found.error + 1e-9).all()
+    assert (np.abs(found.columns.probability - marginals_of(net).probability) < 5 * found.columns.error + 1e-9).all()
 
 
 def test_a_count_in_conflict_is_named():

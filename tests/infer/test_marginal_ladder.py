@@ -58,6 +58,14 @@ def test_time_limit_is_named(asked):
     assert np.isfinite(result.probabilities).all()
 
 
+def test_no_time_is_left_for_the_second_component():
+    others = TEXT.replace("Smokes", "Sings").replace("Friends", "Likes").replace("Cancer", "Fame").replace("1.1", "0.9")
+    model = ml.model_from_text(TEXT + others)
+    evidence = ml.evidence_from_text("\n".join(f"Cancer(P{i})" for i in range(5)) + "\nFame(P2)\n", model=model)
+    result = ml.marginal(model, evidence, ["Smokes", "Sings"], width_limit=8, precision=1e-6, time_limit=1e-6)
+    assert "time limit reached" in result.status
+
+
 def test_traces_name_formulas(sampled):
     assert any(name.startswith("log-weight") for name in sampled.traces)
     assert all(trace.shape[0] == 4 for trace in sampled.traces.values())

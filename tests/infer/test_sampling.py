@@ -92,9 +92,9 @@ def verify_calibrated(net, sampler, seeds=(1, 2, 3, 4)):
     for seed in seeds:
         found = sample(net, *everything(net), sampler, Effort(0.02, 300.0, seed=seed))
         assert found.ending == "precise"
-        sure = found.exact | (found.error == 0)
-        assert np.abs(found.probability - exact)[sure].max(initial=0) < 1e-6
-        scores.append(((found.probability - exact) / np.where(sure, 1, found.error))[~sure])
+        sure = found.columns.exact | (found.columns.error == 0)
+        assert np.abs(found.columns.probability - exact)[sure].max(initial=0) < 1e-6
+        scores.append(((found.columns.probability - exact) / np.where(sure, 1, found.columns.error))[~sure])
     score = np.concatenate(scores)
     assert np.abs(score).max() < 5
     assert 0.92 <= np.mean(np.abs(score) < 1.96) <= 0.98
@@ -105,7 +105,7 @@ def test_gibbs_alone_does_not_cross_between_modes():
     net = two_modes()
     found = sample(net, *everything(net), "gibbs", Effort(0.008, 1.0))
     assert found.ending == "time"
-    assert not found.mixed.all()
+    assert not found.columns.mixed.all()
 
 
 @pytest.mark.parametrize(
@@ -254,18 +254,18 @@ def test_forced_atoms_are_exact():
         [("", 1)] * 3, [([([1, 2], 0, 1), ([1, -2], 0, 1)], False), ([([3], 1, 1)], False)], weights=[np.inf, 0.5]
     )
     found = sample(net, *everything(net), "mcsat", Effort(0.01, 10.0))
-    assert found.exact.tolist() == [True, False, False]
+    assert found.columns.exact.tolist() == [True, False, False]
     assert found.methods[0] == "forced by hard formulas"
-    assert found.probability[0] == 1.0
+    assert found.columns.probability[0] == 1.0
 
 
 def test_rare_atoms_have_an_interval():
     net = network([("", 1)] * 2, [([([1, 2], 0, 1)], False), ([([1], 1, 1)], False)], weights=[0.3, -30.0])
     found = sample(net, *everything(net), "gibbs", Effort(0.01, 10.0))
-    assert not found.exact.any()
+    assert not found.columns.exact.any()
     assert found.methods[0].endswith("never seen otherwise")
-    assert found.low[0] == 0.0
-    assert 0 < found.high[0] < 0.05
+    assert found.columns.low[0] == 0.0
+    assert 0 < found.columns.high[0] < 0.05
 
 
 def test_same_seed_same_answer():
@@ -273,7 +273,7 @@ def test_same_seed_same_answer():
     first, second = (sample(net, *everything(net), "gibbs", Effort(0.02, 10.0, seed=4)) for _ in range(2))
     n = min(first.draws.shape[1], second.draws.shape[1], 20)
     assert n >= 8
-    assert first.probability == pytest.approx(second.probability, abs=0.1)
+    assert first.columns.probability == pytest.approx(second.columns.probability, abs=0.1)
 
 
 @pytest.mark.parametrize("sampler", [gibbs_draws, lambda chain, n, watched: mcsat_draws(chain, n, watched, EVEN)])

@@ -21,47 +21,35 @@ from mlnlite.infer.query import atom_numbers
 from mlnlite.infer.reduce.components import components_of
 from mlnlite.infer.reduce.parts import Part, Summed
 from mlnlite.infer.reduce.potentials import potentials_of
+from mlnlite.infer.sample.columns import Columns, enter, no_answers
 from mlnlite.model.formulas import Expression
 
-_SHARE, _PART, _CHEAP, _FAIR, _FEW = 6, 10, 1 << 18, 1 << 22, 8
-"""Of the time, for model counting; of the precision, for what is left out; entries of first and second tables; few."""
+_SHARE, _PART, _CHEAP, _FAIR, _FEW, _LEAST = 6, 10, 1 << 18, 1 << 22, 8, 0.001
+"""Of the time, for model counting; of the precision, for what is left out; entries of first and second tables; few;
+[s] for sampling if no time is left."""
 
 
 @dataclass(slots=True)
 class Solution:
-    """Answers about atoms, then formulas; arrays of shape (n,), filled in step by step.
+    """Answers about atoms, then formulas, filled in step by step.
 
     Attributes:
-        probability: nan where there is no answer yet.
-        error: standard error, 0 where exact.
-        low: lower end of a 95 % interval.
-        high: its upper end.
-        r_hat: nan where not sampled, or never seen to change.
-        size: effective sample size, nan likewise.
-        exact: whether exact to machine precision.
+        columns: the numbers.
         methods: how each was found.
         log_z: log partition function, nan if not known.
         n_components: of the network.
         largest_table: number of entries.
         endings: why each sampling stopped.
-        mixed: whether chains agree and the effective size is large.
         traces: of sampling, see `Estimates`.
         draws: of each sampling: rows, and series of shape (n_chains, n_batches, n_rows).
     """
 
-    probability: Float
-    error: Float
-    low: Float
-    high: Float
-    r_hat: Float
-    size: Float
-    exact: Bool
+    columns: Columns
     methods: list[str]
     log_z: float = float("nan")
     n_components: int = 0
     largest_table: int = 0
     endings: list[str] = field(default_factory=list)
-    mixed: Bool = field(default_factory=lambda: np.zeros(0, np.bool_))
     traces: dict[str, Float] = field(default_factory=dict)
     draws: list[tuple[Int64, Float32]] = field(default_factory=list)
 
@@ -83,7 +71,7 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
     asked = np.union1d(atoms, np.array(sorted({n for f in formulas for n in atom_numbers(f)}), np.int64)).astype(
         np.int64
     )
-    solution = _nothing_yet(len(atoms) + len(formulas))
+    solution = Solution(no_answers(len(atoms) + len(formulas)), [""] * (len(atoms) + len(formulas)))
     if formulas and approach.method == "bp":
         raise QueryMistake("belief propagation answers atoms only", hint="ask for `auto`, or for the atoms")
     if approach.method in SAMPLERS:
@@ -98,13 +86,13 @@ def solve(network: Network, atoms: Int64, formulas: Sequence[Expression], approa
     _enter(solution, np.arange(len(atoms)), found.probability[atoms], found.slack[atoms], methods)
     _formulas_exactly(small, solution, found, (len(atoms), formulas), approach)
     if len(found.wide) > 1:
-        atoms = _with_twins(network, found, atoms, np.isnan(solution.probability[: len(atoms)]))
-    jobs = sorted(_jobs(found, (atoms, formulas), np.flatnonzero(np.isnan(solution.probability))), key=_n_rows)
+        atoms = _with_twins(network, found, atoms, np.isnan(solution.columns.probability[: len(atoms)]))
+    jobs = sorted(_jobs(found, (atoms, formulas), np.flatnonzero(np.isnan(solution.columns.probability))), key=_n_rows)
     deadline = in_seconds(PATIENCE if approach.time_limit is None else approach.time_limit)
     for i, (components, rows) in enumerate(jobs):
         variables = np.zeros(network.n_variables, np.bool_)
         variables[network.variable[np.isin(found.component, components)]] = True
-        limited = replace(approach, time_limit=deadline.left / (len(jobs) - i))
+        limited = replace(approach, time_limit=max(deadline.left / (len(jobs) - i), _LEAST))
         _enter_sample(network, solution, variables, (atoms, formulas, rows), limited)
     return solution
 
@@ -218,18 +206,11 @@ def _n_rows(job: tuple[Int64, Int64]) -> int:
     return len(job[1])
 
 
-def _nothing_yet(n: int) -> Solution:
-    """A solution to be filled in."""
-    probability, error, low, high, r_hat, size = np.full((6, n), np.nan)
-    no = np.zeros(n, np.bool_)
-    return Solution(probability, error, low, high, r_hat, size, no, [""] * n, mixed=np.ones(n, np.bool_))
-
-
 def _enter(solution: Solution, rows: Int64, probability: Float, slack: Float, methods: Sequence[str]) -> None:
     """Writes down answers that are not sampled, with the share of worlds that each may leave out; nan for unknown."""
-    solution.probability[rows], solution.exact[rows] = probability, slack == 0
-    solution.error[rows], solution.low[rows] = slack, probability * (1 - slack)
-    solution.high[rows] = solution.low[rows] + slack
+    solution.columns.probability[rows], solution.columns.exact[rows] = probability, slack == 0
+    solution.columns.error[rows], solution.columns.low[rows] = slack, probability * (1 - slack)
+    solution.columns.high[rows] = solution.columns.low[rows] + slack
     for row, method in zip(rows.tolist(), methods, strict=True):
         solution.methods[row] = method
 
@@ -307,10 +288,7 @@ def _enter_sample(
     about = atoms[of_atoms], [formulas[i - len(atoms)] for i in of_formulas.tolist()]
     effort = Effort(approach.precision, approach.time_limit, approach.chains, approach.seed)
     estimates = sample(network, variables, about, SAMPLERS.get(approach.method), effort)
-    solution.probability[rows], solution.error[rows] = estimates.probability, estimates.error
-    solution.low[rows], solution.high[rows] = estimates.low, estimates.high
-    solution.r_hat[rows], solution.size[rows] = estimates.r_hat, estimates.size
-    solution.exact[rows], solution.mixed[rows] = estimates.exact, estimates.mixed
+    enter(solution.columns, rows, estimates.columns)
     for row, method in zip(rows.tolist(), estimates.methods, strict=True):
         solution.methods[row] = method
     solution.endings.append(estimates.ending)

@@ -28,7 +28,7 @@ def marginals_from(
         statistics: what it took.
         block: shape (n,), functional block of each row, -1 for none.
     """
-    source, truth = rows
+    (source, truth), columns = rows, solution.columns
     known = source < 0
     decided = np.zeros(len(source))
     decided[: len(truth)] = truth
@@ -37,22 +37,22 @@ def marginals_from(
         padded = np.append(values, np.nan)
         return np.where(known, else_, padded[source])
 
-    exact = np.append(solution.exact, True)[source]
+    exact = np.append(columns.exact, True)[source]
     methods = [EVIDENCE if s < 0 else solution.methods[s] for s in source.tolist()]
     return Marginals(
         names=tuple(names),
-        probabilities=column(solution.probability, decided),
+        probabilities=column(columns.probability, decided),
         methods=tuple(methods),
         exact=exact,
-        error=column(solution.error, 0.0),
+        error=column(columns.error, 0.0),
         status=status_of(names, source, solution),
         log_z=solution.log_z,
         statistics=statistics,
         block=block,
-        low=column(solution.low, decided),
-        high=column(solution.high, decided),
-        r_hat=column(solution.r_hat, np.nan),
-        effective_size=column(solution.size, np.nan),
+        low=column(columns.low, decided),
+        high=column(columns.high, decided),
+        r_hat=column(columns.r_hat, np.nan),
+        effective_size=column(columns.size, np.nan),
         traces=solution.traces,
         draws=tuple((np.flatnonzero(np.isin(source, which)), series) for which, series in solution.draws),
     )
@@ -60,23 +60,23 @@ def marginals_from(
 
 def status_of(names: Sequence[str], source: Int64, solution: Solution) -> str:
     """One line about the whole, naming what is not as it should be."""
-    used = source[source >= 0]
-    if solution.exact[used].all():
+    used, columns = source[source >= 0], solution.columns
+    if columns.exact[used].all():
         return "exact"
     guessed = {m for m in solution.methods if m.startswith(LOOPY)}
     if guessed:
         settled = "" if guessed == {LOOPY} else "; messages did not settle"
         return f"approximate: {LOOPY}, errors not known{settled}"
-    error = float(np.nanmax(solution.error[used]))
-    if {solution.methods[s] for s in used[~solution.exact[used]].tolist()} == {BOUNDED}:
+    error = float(np.nanmax(columns.error[used]))
+    if {solution.methods[s] for s in used[~columns.exact[used]].tolist()} == {BOUNDED}:
         return f"exact to within {error:.1e}"
     parts = [f"sampled, standard errors up to {error:.4f}"]
     parts += [word for end, word in _ENDINGS.items() if end in solution.endings]
-    bad = [i for i in np.flatnonzero(source >= 0).tolist() if not solution.mixed[source[i]]]
+    bad = [i for i in np.flatnonzero(source >= 0).tolist() if not columns.mixed[source[i]]]
     if bad:
-        worst = sorted(bad, key=lambda i: -solution.r_hat[source[i]])[:_NAMED]
+        worst = sorted(bad, key=lambda i: -columns.r_hat[source[i]])[:_NAMED]
         shown = ", ".join(
-            f"{names[i]} (R-hat {solution.r_hat[source[i]]:.3f}, effective size {solution.size[source[i]]:.0f})"
+            f"{names[i]} (R-hat {columns.r_hat[source[i]]:.3f}, effective size {columns.size[source[i]]:.0f})"
             for i in worst
         )
         parts.append(f"{len(bad):,} not well mixed: {shown}{', ...' if len(bad) > _NAMED else ''}")

@@ -41,6 +41,7 @@ def _pairs(cells: Cells, part: Part) -> tuple[list[Cells], float]:
     table = np.zeros((len(names), 4))
     np.add.at(table, (pair[changes], 2 * cells.value[changes, 0] + cells.value[changes, 1]), cells.amount[changes])
     peak = table.max(axis=1)
+    peak[np.isneginf(peak)] = 0.0  # nothing is allowed, and stays so
     table -= peak[:, None]
     row, entry = np.nonzero(table)
     first, second = np.divmod(names[row], len(part.cardinality))

@@ -11,6 +11,7 @@ from mlnlite.ground.network import Bool, Float, Float32, Int64, Network
 from mlnlite.ground.patterns import with_counts
 from mlnlite.infer.approach import PATIENCE, Sampler
 from mlnlite.infer.deadline import Deadline, in_seconds, interruptible
+from mlnlite.infer.sample.columns import Columns
 from mlnlite.infer.sample.diagnostics import jeffreys
 from mlnlite.infer.sample.factors import Factors, factors_of
 from mlnlite.infer.sample.run import (
@@ -56,32 +57,18 @@ class Estimates:
     """What sampling found about atoms, then formulas.
 
     Attributes:
-        probability: shape (n,).
-        error: shape (n,), Monte Carlo standard error; 0 where exact.
-        low: shape (n,), lower end of a 95 % interval.
-        high: shape (n,), its upper end.
-        r_hat: shape (n,), nan where nothing ever changed.
-        size: shape (n,), effective sample size, nan where nothing ever changed.
-        exact: shape (n,), whether hard formulas exclude the other value.
-        methods: how each was found.
+        columns: the numbers; an answer is exact where hard formulas exclude the other value.
+        methods: shape (n,), how each was found.
         ending: why sampling stopped.
-        mixed: shape (n,), whether effective size and R-hat are as they should be.
         traces: of the log-weight of the world and of the number of true groundings of each formula, by name; shape
             (n_chains, n_batches).
         draws: shape (n_chains, n_batches, n), means of batches of draws.
         n_draws: of all chains together.
     """
 
-    probability: Float
-    error: Float
-    low: Float
-    high: Float
-    r_hat: Float
-    size: Float
-    exact: Bool
+    columns: Columns
     methods: tuple[str, ...]
     ending: Ending
-    mixed: Bool
     traces: dict[str, Float]
     draws: Float32
     n_draws: int
@@ -177,7 +164,7 @@ def _estimates(
     uneven = np.concatenate([of_atom, np.full(len(mean) - n_atoms, uneven.any())])
     mixed = ~moved | ((found.size >= LEAST_SIZE) & (found.r_hat <= MOST_R_HAT))
     traces = {name: run.traces.points[:, run.traces.kept, i] for i, name in enumerate(run.names)}
-    return Estimates(
+    columns = Columns(
         mean,
         np.where(exact, 0.0, found.error),
         low,
@@ -185,11 +172,13 @@ def _estimates(
         np.where(moved, found.r_hat, np.nan),
         np.where(moved, found.size, np.nan),
         exact,
-        tuple(
-            _method(sampler, e, m, u) for e, m, u in zip(exact.tolist(), moved.tolist(), uneven.tolist(), strict=True)
-        ),
-        ending,
         mixed,
+    )
+    said = zip(exact.tolist(), moved.tolist(), uneven.tolist(), strict=True)
+    return Estimates(
+        columns,
+        tuple(_method(sampler, e, m, u) for e, m, u in said),
+        ending,
         traces,
         run.traces.means[:, run.traces.kept],
         run.traces.n_draws * len(run.chains),
