@@ -11,7 +11,7 @@ from mlnlite.errors import Diagnostic, LimitReached
 from mlnlite.ground.compile import Compiled, Source
 from mlnlite.model.templates import Template
 
-ROWS_PER_SECOND = 7e6
+ROWS_PER_SECOND = 1.1e7
 """Ground rows a second of one core, from plan to network (measured: docs/explanation/performance.md)."""
 
 BYTES_PER_VALUE = 24
