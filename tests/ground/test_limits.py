@@ -71,7 +71,10 @@ def command(folder, *arguments):
         ("query all.mln -q T --max-memory 100MB", "all.mln:5:1: error [E410]: formula 2 needs about"),
         ("ground hub.mln -e hub.db --max-memory 60MB", "hub.mln:3:1: error [E402]: formula 1 cannot be grounded"),
         ("ground hub.mln -e hub.db --max-groundings 99999", "hub.mln:3:1: error [E402]: formula 1 cannot be grounded"),
-        ("query hub.mln -e hub.db -q G(A1,H,A2) --max-memory 60MB", "hub.mln:3:1: error [E402]: formula 1 cannot be"),
+        (
+            "query hub.mln -e hub.db -q G(A1,H,A2) --method exact --max-memory 60MB",
+            "hub.mln:3:1: error [E402]: formula 1 cannot be",
+        ),
         ("query hub.mln -e hub.db --task map --max-groundings 99999", "hub.mln:3:1: error [E402]: formula 1 cannot"),
         ("query hub.mln -e hub.db --task map --k 2 --max-memory 60MB", "hub.mln:3:1: error [E402]: formula 1 cannot"),
     ],
@@ -106,7 +109,12 @@ def test_memory_stays_near_the_limit(hub):
     [
         (["ground", "--engine", "duckdb"], signal.SIGINT, 130, "interrupted\n"),
         (["ground", "--engine", "duckdb"], signal.SIGTERM, 143, "terminated\n"),
-        (["query", "-q", "G(A1,H,A2)", "--max-memory", "8GB"], signal.SIGTERM, 143, "terminated\n"),
+        (
+            ["query", "-q", "G(A1,H,A2)", "--method", "exact", "--max-memory", "8GB"],
+            signal.SIGTERM,
+            143,
+            "terminated\n",
+        ),
     ],
 )
 def test_an_ended_join_leaves_no_files(hub, arguments, sent, code, said):
