@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import prod
 
 import numpy as np
-from scipy.special import gammaln, logsumexp
 
 from mlnlite.errors import Contradiction, Diagnostic, LimitReached
 from mlnlite.ground.network import Bool, Float, Int64
@@ -64,7 +63,7 @@ def classes_of(fragment: Fragment, evidence: Evidence) -> Classes:
     cell = np.where((fits | (signatures[:, None, :] < 0)).all(axis=2), fragment.own, -np.inf)
     group, pair = groups_of(fragment)
     n = len(pair)
-    own = np.stack([logsumexp(np.where(group == g, cell, -np.inf), axis=1) for g in range(n)], axis=1)
+    own = np.stack([np.logaddexp.reduce(np.where(group == g, cell, -np.inf), axis=1) for g in range(n)], axis=1)
     place = np.full(len(present), -1, np.int64)
     place[present] = of.ravel()
     size = np.bincount(of.ravel(), minlength=len(signatures))
@@ -94,7 +93,8 @@ def log_sum(classes: Classes, apart: Sequence[tuple[int, int]] = ()) -> float:
     n = counts + fixed
     pair = np.where(np.isneginf(classes.pair), _NEVER, classes.pair)
     worth = ways[~np.isneginf(ways)] + 0.5 * (((n @ pair) * n).sum(axis=1) - n @ np.diag(pair))
-    return float(logsumexp(worth) if len(worth) else -np.inf) + sum(float(classes.own[c, g]) for c, g in apart)
+    others = float(np.logaddexp.reduce(worth, initial=-np.inf))
+    return others + sum(float(classes.own[c, g]) for c, g in apart)
 
 
 def _ways(n: int, own: Float) -> Float:
@@ -105,7 +105,8 @@ def _ways(n: int, own: Float) -> Float:
     ways = np.full(last.shape, -np.inf)
     counts = np.vstack([index, last])[:, last >= 0]
     worth = np.where(counts > 0, counts * np.where(np.isneginf(own), _NEVER, own)[:, None], 0.0).sum(axis=0)
-    ways[last >= 0] = np.where(worth < IMPOSSIBLE, -np.inf, worth + gammaln(n + 1) - gammaln(counts + 1).sum(axis=0))
+    factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, n + 1)))])
+    ways[last >= 0] = np.where(worth < IMPOSSIBLE, -np.inf, worth + factorial[n] - factorial[counts].sum(axis=0))
     return ways.reshape(shape)
 
 
@@ -159,7 +160,7 @@ def _alone(classes: Classes, log_z: float, truth: Bool) -> Float:
     """Shape (n_classes,): probability that a constant is in a cell where something is true."""
     inside = np.stack(
         [
-            logsumexp(np.where((classes.group == g) & truth, classes.cell, -np.inf), axis=1)
+            np.logaddexp.reduce(np.where((classes.group == g) & truth, classes.cell, -np.inf), axis=1)
             for g in _all_groups(classes)
         ],
         axis=1,
@@ -193,7 +194,7 @@ def _pairs(classes: Classes, log_z: float, binary: int, who: tuple[Int64, Int64]
 def _pair(classes: Classes, log_z: float, binary: int, of: tuple[int, int]) -> float:
     """Probability of `R(x, y)` for two different constants of given classes."""
     fragment, total = classes.fragment, 0.0
-    true = logsumexp(fragment.pair[:, :, fragment.shared[:, binary, 0]], axis=2)
+    true = np.logaddexp.reduce(fragment.pair[:, :, fragment.shared[:, binary, 0]], axis=2)
     for g in _all_groups(classes):
         for h in _all_groups(classes):
             x = np.where(classes.group == g, classes.cell[of[0]], -np.inf)
@@ -201,5 +202,7 @@ def _pair(classes: Classes, log_z: float, binary: int, of: tuple[int, int]) -> f
             both = log_sum(classes, [(of[0], g), (of[1], h)])
             if np.isfinite(both) and np.isfinite(classes.pair[g, h]):
                 norm = classes.own[of[0], g] + classes.own[of[1], h] + classes.pair[g, h]
-                total += float(np.exp(both - log_z + logsumexp(x[:, None] + y[None, :] + true) - norm))
+                total += float(
+                    np.exp(both - log_z + np.logaddexp.reduce((x[:, None] + y[None, :] + true).ravel()) - norm)
+                )
     return total
