@@ -88,3 +88,17 @@ def test_evidence_that_was_read_for_another_model_is_refused():
     other = ml.model_from_text("S(p)\nG(p, k)\nk = {K9}\nG(x, +v) ^ S(x)")
     with pytest.raises(ml.QueryMistake, match="read for another model"):
         ml.learn(other, data)
+
+
+def test_a_predicate_without_arguments_is_evaluated():
+    model, data = read("R\nS(p)\np = {A, B}\nR => S(x)\nS(x)", "R\nS(A)", "S(B)", "R\nS(A)\nS(B)")
+    (score,) = ml.evaluate(ml.learn(model, data).model, data, predicates=["R"]).scores
+    assert score.n == 2
+    found = ml.crossvalidate(model, data, predict=["R"], split=ml.Split(n_folds=2))
+    assert {row.n for row in found.rows} == {2}
+
+
+def test_the_curvature_needs_no_clusters():
+    facts = "\n".join(f"R(P{i}, P{i + 1})" + f"\nR(P{i + 1}, P{i})" * (i % 3 == 0) for i in range(14))
+    model, data = read("R(p, p)\nEXIST y (R(x, y) ^ R(y, x))\nR(x, y)", facts)
+    assert (ml.uncertainty(ml.learn(model, data), data, method="information").sd > 0).all()

@@ -43,7 +43,7 @@ def expected(model, evidence, targets, unknown=()):
     total = 0.0
     for i in range(evidence.n_databases):
         one = ml.one_database(evidence, i)
-        conditions = exact._hidden(one, frozenset(targets))
+        conditions = exact.without(one, frozenset(targets))
         rest = set(one.predicates) - set(targets) - set(unknown)
         every = log_sum(brute.log_weight(model, one, w) for w in brute.worlds(model, conditions, closed=rest))
         complete = set(one.predicates) - set(unknown)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from mlnlite.errors import Diagnostic, QueryMistake, did_you_mean
 from mlnlite.infer.answer import marginal
 from mlnlite.learn.data.content import content
-from mlnlite.learn.data.missing import closed_but, has_marks, marks_of
+from mlnlite.learn.data.missing import closed_but, every_atom, has_marks, marks_of
 from mlnlite.learn.evaluation import metrics
 from mlnlite.learn.evaluation.metrics import Calibration, Predictions
-from mlnlite.model.evidence import Evidence, Facts
+from mlnlite.learn.objectives.exact import without
+from mlnlite.model.evidence import Evidence
 from mlnlite.model.facts import closed
 from mlnlite.model.model import Model
 from mlnlite.model.read import one_database
@@ -157,7 +158,7 @@ def predictions(
         one = closed_but(one, closing & set(marks), marks)
         same = content(one, others)
         if same not in answers:
-            answers[same] = marginal(model, _without(one, targets), targets)
+            answers[same] = marginal(model, without(one, targets), targets)
         answer = answers[same]
         found[i] = {
             name: _predictions(one, name, answer, marks.get(name), explicit=name in explicit)
@@ -205,20 +206,9 @@ def _closable(evidence: Evidence, names: Iterable[str]) -> list[str]:
     return [name for name in names if evidence.predicates[name].marker != "!"]
 
 
-def _without(evidence: Evidence, names: Iterable[str]) -> Evidence:
-    """The evidence without the facts of some predicates, whose worlds are open."""
-    facts, predicates = dict(evidence.facts), dict(evidence.predicates)
-    for name in names:
-        predicate = predicates[name]
-        facts[name] = Facts(np.empty(0, np.int32), np.empty((0, predicate.arity), np.int32), np.empty(0, np.bool_))
-        predicates[name] = replace(predicate, closed=False)
-    return replace(evidence, facts=facts, predicates=predicates)
-
-
 def _atoms(evidence: Evidence, predicate: Predicate) -> NDArray[np.int32]:
     """All atoms of a predicate in one database, shape (n, arity), block by block."""
-    present = [np.flatnonzero(evidence.present[t][0]).astype(np.int32) for t in predicate.types]
-    atoms = np.stack(np.meshgrid(*present, indexing="ij"), axis=-1).reshape(-1, predicate.arity)
+    atoms = every_atom(evidence, predicate)
     if predicate.value is None:
         return atoms
     return atoms[np.lexsort([atoms[:, predicate.value], *(atoms[:, k] for k in reversed(predicate.keys))])]

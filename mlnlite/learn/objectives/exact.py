@@ -5,6 +5,7 @@ Where a component has too many worlds to list, its database is kept as a network
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -77,7 +78,7 @@ def compiled(
         data, marks = labelled(databases, i, targets, unknown)
         same = content(data, [n for n in data.predicates if n not in targets])
         if same not in networks:
-            networks[same] = ground(model, _hidden(data, targets), engine=engine)
+            networks[same] = ground(model, without(data, targets), engine=engine)
         key = (*content(data, data.predicates), *(m.tobytes() for m in marks.values()))
         if key not in known:
             labels = labels_of(networks[same], data, targets - unknown, marks)
@@ -162,10 +163,10 @@ def _within_blocks(data: Evidence, targets: frozenset[str], marks: Marks) -> dic
 
 def conditions(databases: Evidence, index: int, targets: frozenset[str], unknown: frozenset[str]) -> Evidence:
     """One database without what is predicted; the world of the other predicates is closed, but of the unknown ones."""
-    return _hidden(labelled(databases, index, targets, unknown)[0], targets)
+    return without(labelled(databases, index, targets, unknown)[0], targets)
 
 
-def _hidden(data: Evidence, targets: frozenset[str]) -> Evidence:
+def without(data: Evidence, targets: Collection[str]) -> Evidence:
     """The data without the facts about the targets, and these open."""
     facts, predicates = dict(data.facts), dict(data.predicates)
     for name in targets:

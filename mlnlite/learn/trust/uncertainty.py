@@ -95,8 +95,9 @@ def uncertainty(
         raise QueryMistake(f"the level of an interval is between 0 and 1, found {level:g}")
     if method == "bootstrap":
         return _bootstrap(learned, databases, level, repetitions, seed)
-    grouped, n_clusters = clustered(learned.model, databases, learned.how)
+    grouped, n_clusters = learned.problem, 0
     if method == "sandwich":
+        grouped, n_clusters = clustered(learned.model, databases, learned.how)
         verify_clusters(n_clusters)
     covariance = _covariance(learned, grouped, method)
     few = f"only {n_clusters} independent clusters: these standard errors are rough; compare the bootstrap"
@@ -105,8 +106,7 @@ def uncertainty(
     sd = _sd(covariance, learned)
     weights = learned.weights
     low, high = weights - quantile * sd, weights + quantile * sd
-    clusters = n_clusters if method == "sandwich" else 0
-    return Uncertainty(sd, low, high, level, method, clusters, covariance, warnings)
+    return Uncertainty(sd, low, high, level, method, n_clusters, covariance, warnings)
 
 
 def verify_method(how: How, method: Method) -> None:

@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from mlnlite.errors import LimitReached
+from mlnlite.ground.ground import ground
 from mlnlite.learn.learned import How, targets_of
 from mlnlite.learn.objectives.choose import task_of
+from mlnlite.learn.objectives.exact import conditions
+from mlnlite.learn.objectives.quantified import without_weights
 from mlnlite.learn.optimise.problem import log_likelihood
 from mlnlite.learn.trust.clusters import ENOUGH, clustered
 from mlnlite.learn.trust.effects import unseen
@@ -40,13 +43,18 @@ def verify(
     Raises:
         QueryMistake: if the method does not fit what is learnt, or there are too few clusters; if the path needs a
             likelihood that is too wide to be worked out.
-        Contradiction, EvidenceMistake, LimitReached: if other databases have no probability that can be worked out.
+        Contradiction, EvidenceMistake, LimitReached: if other databases have no probability that can be worked out, or
+            the bootstrap has no network to draw from.
     """
     expanded = replace(model, templates=tuple(t.expanded(databases.types) for t in model.templates))
     if method is not None:
         verify_method(how, method)
     if method == "sandwich" and databases.n_databases < ENOUGH:
         verify_clusters(clustered(expanded, databases, how)[1])
+    if method == "bootstrap":  # draws from this network
+        ground(
+            without_weights(expanded), conditions(databases, 0, targets_of(model, how), frozenset(how.open_predicates))
+        )
     if path:
         verify_path(how, _is_sampled(expanded, databases, how))
     if held_out is not None:
