@@ -61,8 +61,7 @@ def learn(  # noqa: PLR0913
 
     Raises:
         QueryMistake, ModelMistake: if the arguments do not fit, or there is nothing to learn.
-        Contradiction: if the data violate a hard formula.
-        EvidenceMistake: if a block that must have a value has none, or facts have probabilities.
+        Contradiction, EvidenceMistake: the data violate a hard formula, lack a block's value, or have probabilities.
     """
     deadline, prior, start = in_seconds(time_limit), prior_of(prior), monotonic()
     how = how_of(model, databases, objective, (predict, open_predicates), tied, database_weights)

@@ -135,12 +135,8 @@ def find_rules(  # noqa: PLR0913
         found = _search_incomplete(task, hidden(task.every, databases, unknown), np.random.default_rng(seed))
     else:
         found = _search(task, pseudo_problem(_expanded(task.every, databases), databases, task.targets))
-    stable = _stability(task, found.problem, (resamples, seed))
-    made = [
-        Rule(text, float(found.x[j]), score, float(chi2.sf(score, 1)), stable.get(text, 0.0))
-        for text, (j, score) in found.rules.items()
-    ]
-    return Structure(tuple(made), _with_rules(kept, list(found.rules)), len(rules))
+    rated = _rated(found, _stability(task, found.problem, (resamples, seed)))
+    return Structure(rated, _with_rules(kept, list(found.rules)), len(rules))
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +219,12 @@ class _Found:
     rules: dict[str, tuple[int, float]]
     problem: Problem
     x: Float
+
+
+def _rated(found: _Found, stable: Mapping[str, float]) -> tuple[Rule, ...]:
+    """The rules with what is known of them."""
+    every = found.rules.items()
+    return tuple(Rule(text, float(found.x[j]), s, float(chi2.sf(s, 1)), stable[text]) for text, (j, s) in every)
 
 
 def _search_incomplete(task: _Task, unknown: Hidden, random: np.random.Generator) -> _Found:
