@@ -107,12 +107,12 @@ class Penalty:
 
 
 def prior_of(given: Prior | float | None) -> Prior | None:
-    """The prior that a user means: a number is the standard deviation of a Gaussian.
+    """The prior that a user means: a number, also for a formula, is the standard deviation of a Gaussian.
 
     Raises:
         QueryMistake: if a scale is not a positive number, or a mean is no number.
     """
-    prior = Gaussian(given) if isinstance(given, int | float) else given
+    prior = {name: _one(value) for name, value in given.items()} if isinstance(given, Mapping) else _one(given)
     every = [] if prior is None else prior.values() if isinstance(prior, Mapping) else [prior]
     for one in every:
         scale = 1.0 if one is None else one.sd if isinstance(one, Gaussian | Hierarchical) else one.scale
@@ -122,6 +122,10 @@ def prior_of(given: Prior | float | None) -> Prior | None:
         if isinstance(one, Gaussian) and not np.isfinite(one.mean):
             raise QueryMistake(f"the mean of a prior is a number, found {one.mean:g}")
     return prior
+
+
+def _one(given: OnePrior | float | None) -> OnePrior | None:
+    return Gaussian(given) if isinstance(given, int | float) else given
 
 
 def prior_of_each(prior: Prior | None, templates: Sequence[Template]) -> list[OnePrior | None]:
