@@ -16,7 +16,7 @@ from mlnlite.infer.reduce.parts import Part, PartAnswer, all_gains, value_of
 ANNEALING = "annealing"
 _COLDEST = 0.05
 _CHUNK = 2_000_000
-_MOVES, _PER_VARIABLE = 2e7, 20_000
+_MOVES, _PER_VARIABLE, _FEW = 2e7, 20_000, 256
 
 
 def solve_part(
@@ -25,7 +25,7 @@ def solve_part(
     seed: int = 0,
     *,
     moves: float | None = None,
-    restarts: int = 4,
+    restarts: int | None = None,
     start: Int64 | None = None,
 ) -> PartAnswer:
     """Searches a component.
@@ -35,11 +35,13 @@ def solve_part(
         deadline: when to stop.
         seed: of chance.
         moves: how many moves to try in all, by default 20,000 for each variable, but at most 2e7.
-        restarts: how often the temperature falls, from the best world so far and from a random one in turn.
+        restarts: how often the temperature falls, from the best world so far and from a random one in turn; by default
+            4 times, and more often for few variables, where walls of hard formulas are all that keeps from the best.
         start: shape (n,), a world to start from.
     """
     rng, landscape = np.random.default_rng(seed), landscape_of(part)
     n = len(part.variables)
+    restarts = restarts or max(4, _FEW // n)
     world = np.zeros(n, np.int64) if start is None else start.copy()
     best, top = world.copy(), worth(landscape, world)
     sweeps = max(10, int((moves or min(_MOVES, _PER_VARIABLE * n)) / restarts / n))
