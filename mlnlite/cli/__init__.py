@@ -70,6 +70,10 @@ class Commands(click.Group):
             except MlnError as error:
                 click.echo(_message(error, ctx.meta.get("mlnlite.format")), err=True)
                 ctx.exit(NO_ANSWER if isinstance(error, LimitReached) else USER_ERROR)
+            except MemoryError:
+                hint = "`mlnlite ground --forecast` says what formulas take; ask, or learn, about fewer predicates"
+                click.echo(_message(LimitReached("there is not enough memory for this", hint), None), err=True)
+                ctx.exit(NO_ANSWER)
             except (KeyboardInterrupt, SystemExit) as error:
                 if isinstance(error, SystemExit) and not terminated:
                     raise

@@ -19,6 +19,9 @@ from mlnlite.errors import LimitReached
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
 
+_SHARE = 4
+"""Rows as arrays may take this part of the machine's memory: what is made of them takes as much again, and more."""
+
 
 @dataclass(frozen=True, slots=True)
 class DuckDBEngine:
@@ -62,7 +65,7 @@ class DuckDBEngine:
     def _verify_size(self, connection: DuckDBPyConnection, plan: Plan) -> None:
         """Refuses a plan whose rows are too many for memory: once they are arrays, the database does not bound them."""
         ((n_rows,),) = connection.execute(f"SELECT count(*) FROM ({query(plan)})").fetchall()
-        limit = self.memory or machine_memory()
+        limit = self.memory or (machine_memory() or 0) // _SHARE or None
         if limit is not None and n_rows * 8 * len(columns_of(plan)) > limit:
             raise LimitReached(f"a join has {n_rows:,} rows, too many for {limit:,} bytes")
 
@@ -73,7 +76,7 @@ class DuckDBEngine:
 
         try:
             yield
-        except duckdb.OutOfMemoryException as error:
+        except (duckdb.OutOfMemoryException, MemoryError) as error:
             limit = "there is" if self.memory is None else f"the limit of {self.memory:,} bytes"
             raise LimitReached(f"{what} needs more memory than {limit}") from error
         except duckdb.IOException as error:

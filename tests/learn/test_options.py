@@ -13,6 +13,7 @@ from click.testing import CliRunner
 import mlnlite as ml
 from mlnlite.cli import mlnlite as command
 from mlnlite.learn import weights
+from mlnlite.learn.data import counts
 from mlnlite.learn.optimise.problem import log_likelihood
 from mlnlite.learn.trust import verify
 
@@ -192,3 +193,24 @@ def test_a_path_that_would_have_to_be_sampled_is_refused_before_learning(tmp_pat
     assert result.exit_code == 2
     assert "not sampled" in result.output
     assert not Path("out.mln").exists()
+
+
+def test_counts_that_take_too_much_memory_name_their_formula(monkeypatch):
+    monkeypatch.setattr(counts, "machine_memory", lambda: 1000)
+    model = ml.model_from_text("Friends(p, p)\nSmokes(p)\nFriends(x, y)\nFriends(x, y) ^ Smokes(x) => Smokes(y)\n")
+    data = ml.evidence_from_text("Friends(Ann, Bob)\nSmokes(Ann)\nSmokes(Cid)\n", model=model)
+    with pytest.raises(ml.LimitReached, match="formula 1 touches too many atoms of Friends") as caught:
+        ml.learn(model, data)
+    assert "--predict" in caught.value.diagnostics[0].hint
+
+
+def test_too_little_memory_is_said(monkeypatch, tmp_path):
+    def learn(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(ml, "learn", learn)
+    (tmp_path / "m.mln").write_text("Smokes(p)\nSmokes(x)\n")
+    (tmp_path / "d.db").write_text("Smokes(Ann)\n")
+    result = CliRunner().invoke(command, ["learn", str(tmp_path / "m.mln"), str(tmp_path / "d.db")])
+    assert result.exit_code == 1
+    assert "not enough memory" in result.output

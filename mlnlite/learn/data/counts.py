@@ -7,13 +7,15 @@ the data gives the bindings in which that literal decides, and a count gathers t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mlnlite.engines.memory import machine_memory
 from mlnlite.engines.plan import Count, Plan, Run
-from mlnlite.errors import Contradiction, Diagnostic
+from mlnlite.errors import Contradiction, Diagnostic, LimitReached
 from mlnlite.ground.compile import Source, bindings, with_number
 from mlnlite.ground.ground import source_of
 from mlnlite.learn.data.separate import Case, cases
@@ -25,6 +27,9 @@ from mlnlite.model.symbols import Predicate
 from mlnlite.model.templates import Template
 
 Int64 = NDArray[np.int64]
+
+ENTRY = 200
+"""Bytes that an entry takes while entries are gathered (measured)."""
 
 DENSE = 4
 """Sums are kept in a table if it has at most this many times as many places as there are entries."""
@@ -64,6 +69,7 @@ def entries(
         Contradiction: if the data violate a hard formula.
     """
     found: dict[str, list[Entries]] = {name: [] for name in targets}
+    n = 0
     loaded: dict[bytes, tuple[Evidence, Run]] = {}
     for i, template in templates.items():
         for databases in _alike(template, evidence):
@@ -77,9 +83,29 @@ def entries(
             for sign, case in _cases(source):
                 for target, (schema, _) in enumerate(case.literals):
                     if schema.predicate in targets:
-                        counted = _counted(source, case, target, sign, int(first[i]), run)
+                        with _named(template, schema.predicate):
+                            counted = _counted(source, case, target, sign, int(first[i]), run)
+                            n += sum(len(e.atom) for e in counted)
+                            _verify_memory(n)
                         found[schema.predicate] += [replace(e, database=databases[e.database]) for e in counted]
     return found
+
+
+@contextmanager
+def _named(template: Template, target: str) -> Iterator[None]:
+    """Says of which formula it was that a limit was reached, and what would help."""
+    try:
+        yield
+    except LimitReached as error:
+        message = f"{template.name} touches too many atoms of {target}: {error.diagnostics[0].message}"
+        hint = f"if {target} is evidence only, say what is to be predicted (`predict`, `--predict`)"
+        raise LimitReached([Diagnostic("E410", message, template.span, hint)]) from error
+
+
+def _verify_memory(n_entries: int) -> None:
+    memory = machine_memory()
+    if memory is not None and n_entries * ENTRY > memory:
+        raise LimitReached(f"{n_entries:,} counts take more memory than there is")
 
 
 def _verify_holds(template: Template, source: Source, run: Run) -> None:
