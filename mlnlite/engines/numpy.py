@@ -307,7 +307,7 @@ def _lookup(plan: Lookup, rows: _Rows, store: _Store) -> _Rows:
         return rows if plan.dropped is None else rows.keep(rows.columns[plan.name] != plan.dropped)
     key = tuple(f"k{i}" for i in range(len(plan.key)))
     found, absent = store.look_up(Scan(plan.table, (*key, None)), key, value, [rows.value(k) for k in plan.key])
-    if plan.dropped is not None:
+    if plan.dropped is not None and plan.dropped != absent:
         rows = rows.with_column(plan.name, found).keep(found != plan.dropped)
         found = rows.columns[plan.name]
     return rows.with_column(plan.name, np.where(found == absent, rows.value(plan.default), found))

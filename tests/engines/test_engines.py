@@ -60,7 +60,7 @@ def stored(draw):
     return {name: tuple(rows.T) for name, rows in zip("rst", (*columns, table), strict=True)}
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(stored())
 def test_engines_agree(tables):
     runs = [engine.load(tables) for engine in (NumpyEngine(), DuckDBEngine(), ReferenceEngine())]
