@@ -7,6 +7,7 @@ as all else that a short command does.
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -18,6 +19,7 @@ from mlnlite.syntax.build_foreign import FOREIGN_BUILDERS
 from mlnlite.syntax.explain import Failure, explain
 from mlnlite.syntax.nesting import refuse_deep_nesting
 from mlnlite.syntax.place import Language, Place
+from mlnlite.syntax.tree import Constant, TypeDeclaration
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
@@ -37,6 +39,10 @@ _STARTS: dict[Language, tuple[str, ...]] = {
 
 
 _FILES = {"standard": "mln.lark", "prac": "mln.lark", "evidence": "evidence.lark"}
+
+
+_PLAIN_TYPE = re.compile(r"\s*([^\W\d]\w*)\s*=\s*\{((?:\s*\w+\s*,)*\s*\w+\s*)(\})\s*")
+_PLAIN_WORD = re.compile(r"\w+")
 
 
 @cache
@@ -75,6 +81,9 @@ def parse_node(rule: str, text: str, place: Place, language: Language) -> Any:  
     """
     from lark.exceptions import UnexpectedInput
 
+    plain = _PLAIN_TYPE.fullmatch(text) if rule == "type_declaration" and language in _FILES else None
+    if plain is not None:
+        return _plain_type(plain, place)
     refuse_deep_nesting(text, place)
     try:
         tree = _parser(language).parse(text, start=rule)
@@ -82,6 +91,14 @@ def parse_node(rule: str, text: str, place: Place, language: Language) -> Any:  
         at, expected = _where(error, len(text))
         raise SyntaxMistake([explain(Failure(place, text, at, frozenset(expected), language, rule))]) from None
     return _build(tree, replace(place, language=language))
+
+
+def _plain_type(match: re.Match[str], place: Place) -> TypeDeclaration:
+    """A type whose constants are plain words, which may be very many: the same as the grammar makes of it."""
+    begin, end = match.span(2)
+    words = _PLAIN_WORD.finditer(match.string, begin, end)
+    constants = tuple(Constant(word[0], place.span(word.start(), word.end())) for word in words)
+    return TypeDeclaration(match[1], constants, place.span(match.start(1), match.end(3)))
 
 
 def _where(error: UnexpectedInput, end: int) -> tuple[int, set[str]]:
