@@ -62,7 +62,8 @@ def _load_compiler() -> None:
         import_module("numba")
     finally:
         slow.cancel()
-    _announce_compiling()
+    numba_events: Any = import_module("numba.core.event")
+    numba_events.register("numba:compile", _announcer())
 
 
 def _say(what: str) -> None:
@@ -78,8 +79,8 @@ def _later(seconds: float, what: Callable[[], None]) -> Timer:
     return timer
 
 
-def _announce_compiling() -> None:
-    """Has what takes so long said: when Numba begins to compile something that its cache does not hold, and while."""
+def _announcer() -> Any:  # noqa: ANN401
+    """Says what takes so long: when Numba begins to compile something that its cache does not hold, and while."""
     numba_events: Any = import_module("numba.core.event")
     depth, due, reminders = [0], [0.0], list[Timer]()
 
@@ -105,4 +106,4 @@ def _announce_compiling() -> None:
             if depth[0] == 0:
                 reminders[0].cancel()
 
-    numba_events.register("numba:compile", Announcer())
+    return Announcer()

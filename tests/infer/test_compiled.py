@@ -8,16 +8,15 @@ from mlnlite import compiled
 
 
 def test_what_compiles_long_is_said_again_until_it_is_done(monkeypatch, caplog):
-    compiled._load_compiler()
     monkeypatch.setattr(compiled, "_EVERY", 0.02)
-    compiled._announce_compiling()
+    listener, beginning = compiled._announcer(), event.Event("numba:compile", event.EventStatus.START)
     end = monotonic() + 10
-    event.start_event("numba:compile")
-    event.start_event("numba:compile")  # a function that the first one calls
-    event.end_event("numba:compile")
+    listener.on_start(beginning)
+    listener.on_start(beginning)  # a function that the first one calls
+    listener.on_end(beginning)
     while len(caplog.records) < 4 and monotonic() < end:
         sleep(0.01)
-    event.end_event("numba:compile")
+    listener.on_end(beginning)
     said = [r.getMessage() for r in caplog.records]
     assert said[0].startswith("compiling fast code for the first time")
     assert said[-1] == "compiling more of it"
