@@ -11,7 +11,7 @@ from mlnlite.errors import Diagnostic, SyntaxMistake, did_you_mean
 from mlnlite.source import Source, Span
 from mlnlite.syntax.messages import mistake
 
-MAX_BYTES = 256 * 1024 * 1024
+MAX_BYTES = 1024 * 1024 * 1024
 _ARCHIVE = re.compile(r"(.+\.pracmln)(?::(.+))?", re.DOTALL)
 _BOM = b"\xef\xbb\xbf"
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")

@@ -228,8 +228,8 @@ def test_files_that_cannot_be_read(tmp_path, name, content, code):
 
 def test_too_large(tmp_path):
     with (tmp_path / "big.mln").open("wb") as file:
-        file.truncate(300 * 2**20)
-    with pytest.raises(SyntaxMistake, match="300 MB"):
+        file.truncate(1100 * 2**20)
+    with pytest.raises(SyntaxMistake, match="1100 MB"):
         read_source(tmp_path / "big.mln")
 
 
