@@ -62,7 +62,7 @@ def test_sigterm_ends_a_search(tmp_path, options):
         time.sleep(seconds)
         process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=30)
-        if process.returncode != -signal.SIGTERM:  # which it is before the command begins
+        if process.returncode > 0:  # below 0 it is before the command begins, or while Python loads modules
             break
     assert (process.returncode, out) == (143, "")
     assert err.endswith("terminated\n")
