@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlnlite.errors import LimitReached
-from mlnlite.model.formulas import All, Any, AtomRef, Count, Equal, Exists, Expression, Iff, Not
+from mlnlite.model.formulas import All, Any, AtomRef, Count, Equal, Exists, Expression, Iff, Not, parts_of
 from mlnlite.model.propositional import FALSE, TRUE, Proposition
 
 WIDEST_TABLE = 14
@@ -107,18 +107,8 @@ def atoms_in(expression: Expression) -> set[int]:
 
 
 def equalities_in(expression: Expression) -> Iterator[Equal]:
-    """The equalities of an expression without quantifiers, as often as they stand there."""
-    match expression:
-        case Equal():
-            yield expression
-        case Not(operand):
-            yield from equalities_in(operand)
-        case All(operands) | Any(operands):
-            for operand in operands:
-                yield from equalities_in(operand)
-        case Iff(left, right):
-            yield from equalities_in(left)
-            yield from equalities_in(right)
+    """The equalities of an expression, as often as they stand there."""
+    return (part for part in parts_of(expression) if isinstance(part, Equal))
 
 
 def truth_table(expression: Expression, propositions: tuple[Proposition, ...]) -> NDArray[np.bool_]:

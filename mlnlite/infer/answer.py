@@ -82,10 +82,9 @@ def marginal(  # noqa: PLR0913
         LimitReached: if a formula needs more than the limits of grounding, or an exact answer was asked for and would
             need more than the limit.
     """
-    approach = Approach(method, width_limit, precision, time_limit, chains, seed)
     start, must = perf_counter(), method == "lifted"
+    approach = Approach("exact" if must else method, width_limit, precision, time_limit, chains, seed)
     question, evidence = closed_and_asked(model, evidence, query, closed_world)
-    approach = replace(approach, method="exact") if must else approach
     if question is not None and method in ("auto", "lifted"):
         found = lifted_answers(model, evidence, question, must=must, width_limit=width_limit, limits=limits)
         if found is not None:

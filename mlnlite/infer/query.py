@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
@@ -29,6 +29,7 @@ from mlnlite.model.formulas import (
     Iff,
     Not,
     Var,
+    parts_of,
 )
 from mlnlite.model.model import Model
 from mlnlite.model.propositional import FALSE, TRUE, Binding, without_quantifiers
@@ -238,19 +239,9 @@ def _text(formula: tree.Formula, binding: dict[str, str], model: Model) -> str:
     return write_formula(map_terms(formula, change) if binding else formula, model.dialect)
 
 
-def atom_numbers(expression: Expression) -> Iterable[int]:
+def atom_numbers(expression: Expression) -> list[int]:
     """Numbers of the atoms of a ground expression."""
-    match expression:
-        case AtomRef(index):
-            return [index]
-        case Not(operand):
-            return atom_numbers(operand)
-        case All(operands) | Any(operands):
-            return [n for operand in operands for n in atom_numbers(operand)]
-        case Iff(left, right):
-            return [*atom_numbers(left), *atom_numbers(right)]
-        case _:
-            return []
+    return [part.index for part in parts_of(expression) if isinstance(part, AtomRef)]
 
 
 def locate(network: Network, numbers: Int64) -> tuple[Int64, NDArray[np.bool_]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -123,3 +124,19 @@ class Formula:
     def free(self) -> tuple[int, ...]:
         """Indices of the free variables: one grounding for each binding of these."""
         return tuple(i for i, v in enumerate(self.variables) if not v.bound)
+
+
+def parts_of(expression: Expression) -> Iterator[Expression]:
+    """An expression and all that is in it."""
+    yield expression
+    match expression:
+        case Not(body) | Exists(_, body) | Count(_, body, _, _):
+            yield from parts_of(body)
+        case All(operands) | Any(operands):
+            for operand in operands:
+                yield from parts_of(operand)
+        case Iff(left, right):
+            yield from parts_of(left)
+            yield from parts_of(right)
+        case _:
+            pass

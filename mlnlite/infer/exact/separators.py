@@ -6,24 +6,18 @@ formulas, worlds fall apart by the constant that it stands for (Poole 2003; De S
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 
 from mlnlite.model.evidence import Evidence
 from mlnlite.model.formulas import (
-    All,
-    Any,
     Argument,
     AtomSchema,
     Const,
-    Count,
     Equal,
-    Exists,
-    Expression,
-    Iff,
-    Not,
     Var,
+    parts_of,
 )
 from mlnlite.model.symbols import Predicate
 from mlnlite.model.templates import Template
@@ -174,19 +168,3 @@ def compared_with(template: Template, term: Argument) -> set[int] | None:
         else:
             return None
     return constants
-
-
-def parts_of(expression: Expression) -> Iterator[Expression]:
-    """An expression and all that is in it."""
-    yield expression
-    match expression:
-        case Not(body) | Exists(_, body) | Count(_, body, _, _):
-            yield from parts_of(body)
-        case All(operands) | Any(operands):
-            for operand in operands:
-                yield from parts_of(operand)
-        case Iff(left, right):
-            yield from parts_of(left)
-            yield from parts_of(right)
-        case _:
-            pass
